@@ -1,0 +1,1 @@
+"""Protocol, plan, engine, record; exposure, window, radiometry; the command line."""

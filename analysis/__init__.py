@@ -1,0 +1,1 @@
+"""Reflectance models, fit, choice, uncertainty, charts and reports. Knows only `instrument`."""

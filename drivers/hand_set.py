@@ -1,0 +1,60 @@
+"""What a person does in a motor's place: an axis that is set, a lamp that is covered, by hand."""
+
+from __future__ import annotations
+
+from instrument.devices import Operator, Request
+from instrument.errors import DeviceError
+
+
+class HandSetAxis:
+    """A stage whose motor is the operator. Angles are those that the operator reads."""
+
+    def __init__(self, name: str, words: str, operator: Operator) -> None:
+        self._name, self._words, self._operator = name, words, operator
+        self._angle_deg: float | None = None
+
+    def identity(self) -> str:
+        """Who moves this axis."""
+        return f"{self._name} set by hand"
+
+    def home(self) -> None:
+        """Nothing to find: the operator reads the scale."""
+
+    def start_move(self, angle_deg: float) -> None:
+        """Ask for the angle and wait for the answer."""
+        request = Request(
+            "set axis",
+            f"Set {self._words} ({self._name}) to {angle_deg:g} degrees",
+            axis=self._name,
+            angle_deg=angle_deg,
+        )
+        self._operator.ask(request)
+        self._angle_deg = angle_deg
+
+    def wait(self) -> float:
+        """The angle that was set, in degrees."""
+        if self._angle_deg is None:
+            raise DeviceError(f"{self._name} is set by hand and has not been set yet")
+        return self._angle_deg
+
+    def stop(self) -> None:
+        """A hand needs no stopping."""
+
+
+class HandCoveredLamp:
+    """A lamp without a shutter: the operator covers it."""
+
+    def __init__(self, operator: Operator) -> None:
+        self._operator = operator
+
+    def identity(self) -> str:
+        """Who darkens this lamp."""
+        return "lamp covered by hand"
+
+    def darken(self) -> None:
+        """Ask to cover the lamp."""
+        self._operator.ask(Request("cover lamp", "Cover the lamp: dark frames are next"))
+
+    def light(self) -> None:
+        """Ask to uncover the lamp."""
+        self._operator.ask(Request("uncover lamp", "Uncover the lamp"))

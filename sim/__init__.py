@@ -1,0 +1,1 @@
+"""One simulated scene: its stage, camera, lamp and operator."""

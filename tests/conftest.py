@@ -1,0 +1,51 @@
+"""Shared by all tests: the shipped configuration and what the command line asks for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from instrument.config import Loaded, load_protocol
+from instrument.rig_config import Rig
+
+ROOT = Path(__file__).resolve().parent.parent
+CONFIGS = ROOT / "configs"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--slow", action="store_true", help="run the long proofs whole")
+
+
+@pytest.fixture
+def slow(request: pytest.FixtureRequest) -> bool:
+    return bool(request.config.getoption("--slow"))
+
+
+@pytest.fixture(scope="session")
+def demo() -> Loaded:
+    return load_protocol(CONFIGS / "protocols" / "demo.yaml")
+
+
+def changed(loaded: Loaded, rig: dict[str, Any] | None = None, **protocol: Any) -> Loaded:
+    """The same configuration with some entries replaced (not validated again)."""
+    return replace(
+        loaded,
+        rig=loaded.rig.model_copy(update=rig or {}),
+        protocol=loaded.protocol.model_copy(update=protocol),
+    )
+
+
+def exact_rig(rig: Rig) -> Rig:
+    """The rig as its file says it is: true angles, sample on the axis, a constant lamp."""
+    axes = rig.axes.model_copy(
+        update={
+            n: rig.axes[n].model_copy(update={"u_deg": 0.0}) for n in ("theta_i", "dphi", "theta_r")
+        }
+    )
+    simulation = rig.simulation.model_copy(
+        update={"sample_height_mm": 0.0, "lamp_drift_per_hour": 0.0}
+    )
+    return rig.model_copy(update={"axes": axes, "simulation": simulation})
