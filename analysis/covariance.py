@@ -1,0 +1,154 @@
+"""Covariance of the measured points: independent errors and those that points share.
+
+C = diag(variance) + common common^T, each column of `common` being one error that several points
+share: how far one standard deviation of it shifts each of them (GUM, and Cox and Harris,
+generalised least squares).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from analysis.measurements import IntArray, Measurements
+from instrument.geometry import FloatArray, Geometry
+
+
+@dataclass(frozen=True, slots=True)
+class Covariance:
+    """C = diag(variance) + common common^T of N points with K shared errors.
+
+    variance: (N,), independent variances, positive, in the square of the data's unit.
+    common: (N, K), standard shifts by each shared error, in the data's unit.
+    """
+
+    variance: FloatArray
+    common: FloatArray
+    _basis: FloatArray = field(init=False, repr=False)
+    _shrink: FloatArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if np.any(self.variance <= 0) or not np.all(np.isfinite(self.variance)):
+            raise ValueError(
+                f"variance = {self.variance.min():g}; allowed: finite, more than 0 for every point"
+            )
+        # In units of the independent errors C is 1 + V V^T; with the singular values S and the
+        # left vectors Q of V its inverse root is 1 - Q (1 - 1 / sqrt(1 + S^2)) Q^T. The same
+        # chi2 as from a Cholesky factor, at the cost of N K^2 and without a matrix of N x N.
+        Q, S, _ = np.linalg.svd(
+            self.common / np.sqrt(self.variance)[:, np.newaxis], full_matrices=False
+        )
+        object.__setattr__(self, "_basis", Q)
+        object.__setattr__(self, "_shrink", 1 - 1 / np.sqrt(1 + S * S))
+
+    def whiten(self, x: FloatArray) -> FloatArray:
+        """C^(-1/2) x for x of shape (N,) or (N, M): residuals become independent with u = 1."""
+        scale = np.sqrt(self.variance)
+        y = x / (scale if x.ndim == 1 else scale[:, np.newaxis])
+        inner = self._basis.T @ y
+        shrink = self._shrink if x.ndim == 1 else self._shrink[:, np.newaxis]
+        return np.asarray(y - self._basis @ (shrink * inner))
+
+    @property
+    def u_total(self) -> FloatArray:
+        """Standard uncertainty of each point, (N,): the root of C's diagonal."""
+        return np.asarray(np.sqrt(self.variance + np.square(self.common).sum(axis=1)))
+
+    @property
+    def u_independent(self) -> FloatArray:
+        """The part of it that no other point shares, (N,)."""
+        return np.sqrt(self.variance)
+
+    def matrix(self) -> FloatArray:
+        """C in full, (N, N)."""
+        return np.asarray(np.diag(self.variance) + self.common @ self.common.T)
+
+
+def independent(measurements: Measurements) -> Covariance:
+    """Covariance of `u_random` alone; where that is not stated, of 1 for every point."""
+    u = measurements.u_random
+    variance = np.ones(measurements.size) if u is None else np.square(u)
+    return Covariance(variance, np.zeros((measurements.size, 0)))
+
+
+def shared(
+    measurements: Measurements,
+    smooth: Callable[[Geometry], FloatArray],
+    own: Callable[[Geometry], FloatArray] | None = None,
+) -> Covariance:
+    """Covariance of all stated uncertainties, around models near the data (BRDF in 1/sr).
+
+    `smooth`, the best model so far, turns the independent error of theta_r into one of the BRDF:
+    the same for every model that is fitted to the data. `own` (default `smooth`) is the model that
+    is being fitted: it turns the shared errors into shifts. With another model's shifts, a large
+    enough error of the tile would pass for the structure in which the two models differ.
+
+    Relative errors are multiplied with a model and not with the data: scaled by noisy data, a
+    common relative error pulls the fit towards the low points (Peelle's pertinent puzzle).
+    Raises `ValueError` where `u_random` is not stated.
+    """
+    m, own = measurements, own or smooth
+    if m.u_random is None:
+        raise ValueError("u_random is not stated; allowed: a u_random in 1/sr for every point")
+    f = own(m.geometry)
+    groups = [
+        (_change(m, own, theta_i=m.u_theta_i_deg), m.lamp_setting),
+        (_change(m, own, dphi=m.u_dphi_deg), m.lamp_setting),
+        (f * m.u_reference, m.reference),
+        (f * m.u_tile, np.zeros(m.size, dtype=np.int64)),
+    ]
+    if m.placement is not None and m.u_placement is not None:
+        groups.append((f * m.u_placement, m.placement))
+    variance = np.square(m.u_random) + np.square(_change(m, smooth, theta_r=m.u_theta_r_deg))
+    columns = []
+    for shift, group in groups:
+        alone, several = _columns(shift, group)
+        variance = variance + np.square(alone)
+        columns.append(several)
+    return Covariance(variance, np.concatenate(columns, axis=1))
+
+
+def _columns(shift: FloatArray, group: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Shifts (N,) of points that share theirs with none, and a column for every other group."""
+    _, member, count = np.unique(group, return_inverse=True, return_counts=True)
+    alone = count[member] == 1
+    if not np.any(shift):
+        return np.zeros_like(shift), np.zeros((shift.size, 0))
+    several = np.flatnonzero(count > 1)
+    return np.where(alone, shift, 0.0), np.where(
+        member[:, np.newaxis] == several, shift[:, np.newaxis], 0.0
+    )
+
+
+def _change(
+    m: Measurements,
+    smooth: Callable[[Geometry], FloatArray],
+    theta_i: float = 0.0,
+    theta_r: float = 0.0,
+    dphi: float = 0.0,
+) -> FloatArray:
+    """Half the change of the model from -u to +u of an angle (degrees), (N,): (df/dx) u.
+
+    Steps of u itself, so that a kink counts as far as u reaches over it. Beyond 90 degrees there
+    is no geometry: there the change on the other side counts alone.
+    """
+    if theta_i == theta_r == dphi == 0:
+        return np.zeros(m.size)
+    up, up_step = _moved(m, theta_i, theta_r, dphi)
+    down, down_step = _moved(m, -theta_i, -theta_r, -dphi)
+    return np.asarray((smooth(up) - smooth(down)) / (up_step + down_step))
+
+
+def _moved(
+    m: Measurements, theta_i: float, theta_r: float, dphi: float
+) -> tuple[Geometry, FloatArray]:
+    """Geometry with the angles moved, and 1 where that could be done, 0 where not."""
+    new_i, new_r = m.theta_i_deg + theta_i, m.theta_r_deg + theta_r
+    inside = (np.abs(new_i) <= 90) & (np.abs(new_r) <= 90)
+    new_i, new_r = np.where(inside, new_i, m.theta_i_deg), np.where(inside, new_r, m.theta_r_deg)
+    # A lamp that passes the normal stands on the other side: dphi turns by 180.
+    new_dphi = m.dphi_deg + dphi + np.where(new_i < 0, 180.0, 0.0)
+    moved = Geometry.from_degrees(theta_i=np.abs(new_i), theta_r=new_r, dphi=new_dphi)
+    return moved, inside.astype(np.float64)

@@ -1,0 +1,49 @@
+"""Reflectance models by name: `MODELS["oren_nayar"].brdf(geometry, albedo=0.9, sigma_deg=30)`.
+
+A sum is written with `+`: `MODELS["oren_nayar+torrance_sparrow"]`; a parameter name that its parts
+share (`sigma_deg`) is one parameter of the sum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+
+from analysis.models.base import Model, Parameter, add
+from analysis.models.diffuse import LAMBERT, OREN_NAYAR, OREN_NAYAR_QUALITATIVE
+from analysis.models.specular import TORRANCE_SPARROW
+
+__all__ = ["MODELS", "Model", "Parameter"]
+
+_SINGLE = {m.name: m for m in (LAMBERT, OREN_NAYAR_QUALITATIVE, OREN_NAYAR, TORRANCE_SPARROW)}
+
+
+class _Models(Mapping[str, Model]):
+    """Read-only mapping name -> model; lists the single models, and gives any sum of them."""
+
+    def __getitem__(self, name: str) -> Model:
+        """The model of that name. Raises `KeyError` that lists the known ones."""
+        return _named(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_SINGLE)
+
+    def __len__(self) -> int:
+        return len(_SINGLE)
+
+
+@cache
+def _named(name: str) -> Model:
+    parts = name.split("+")
+    unknown = [part for part in parts if part not in _SINGLE]
+    if unknown:
+        raise KeyError(
+            f"unknown model {unknown[0]!r} in {name!r}; known: {', '.join(_SINGLE)}, "
+            "and their sums, written with +"
+        )
+    if len(set(parts)) < len(parts):
+        raise KeyError(f"a model stands twice in {name!r}; a sum names each model once")
+    return _SINGLE[name] if len(parts) == 1 else add(*(_SINGLE[part] for part in parts))
+
+
+MODELS: Mapping[str, Model] = _Models()

@@ -1,0 +1,140 @@
+"""The choice of a model: structure is found when it is there, and only then."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_analysis_scan import DIFFUSE, GLOSSY, RIG, scan, scan_angles
+
+from analysis.acceptance import Acceptance
+from analysis.choice import LADDER, choose, to_json
+from analysis.measurements import Measurements
+from analysis.models import MODELS
+from instrument.errors import NotDetermined
+from instrument.geometry import Geometry
+
+GLOSS = "oren_nayar+torrance_sparrow"
+
+
+@pytest.mark.parametrize("acceptance", [None, RIG], ids=["plain", "averaged"])
+@pytest.mark.parametrize(("sigma", "albedo"), DIFFUSE)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_diffuse_samples(
+    sigma: float, albedo: float, seed: int, acceptance: Acceptance | None
+) -> None:
+    m = scan("oren_nayar", seed, acceptance=acceptance, albedo=albedo, sigma_deg=sigma)
+    found = choose(m, acceptance)
+    assert (found.chosen, found.verdict) == ("oren_nayar", "adequate"), found.reason
+
+
+@pytest.mark.parametrize("acceptance", [None, RIG], ids=["plain", "averaged"])
+@pytest.mark.parametrize(("sigma", "albedo", "ks"), GLOSSY)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_glossy_samples(
+    sigma: float, albedo: float, ks: float, seed: int, acceptance: Acceptance | None
+) -> None:
+    m = scan(GLOSS, seed, acceptance=acceptance, albedo=albedo, sigma_deg=sigma, ks=ks)
+    found = choose(m, acceptance)
+    assert (found.chosen, found.verdict) == (GLOSS, "adequate"), found.reason
+
+
+@pytest.mark.parametrize(
+    ("name", "truth"),
+    [
+        ("lambert", {"albedo": 0.8}),
+        ("oren_nayar_qualitative", {"albedo": 0.8, "sigma_deg": 25.0}),
+        ("lambert+torrance_sparrow", {"albedo": 0.7, "sigma_deg": 6.0, "ks": 0.05}),
+        ("lambert+torrance_sparrow", {"albedo": 0.7, "sigma_deg": 2.0, "ks": 0.05}),
+    ],
+)
+@pytest.mark.parametrize("u_tile", [0.0, 0.005])
+def test_other_samples(name: str, truth: dict[str, float], u_tile: float) -> None:
+    for seed in range(3):
+        found = choose(scan(name, seed, u_tile=u_tile, **truth))
+        assert (found.chosen, found.verdict) == (name, "adequate"), found.reason
+
+
+def test_a_small_unknown_error_makes_no_lobe() -> None:
+    m = scan("oren_nayar", 1, albedo=0.9, sigma_deg=30)
+    for error in (np.cos(2 * np.radians(m.theta_r_deg)), m.theta_r_deg / 80, m.theta_r_deg > 0):
+        found = choose(replace(m, brdf=m.brdf * (1 + 1e-3 * error)))
+        assert found.chosen == "oren_nayar", found.reason
+
+
+def test_none_adequate_says_where() -> None:
+    m = scan("lambert", 1, albedo=0.5)
+    peak = 1 + 0.3 * np.exp(-(((m.theta_r_deg - 20) / 8) ** 2))
+    found = choose(replace(m, brdf=m.brdf * peak))
+    assert found.verdict == "none adequate"
+    assert found.chosen in LADDER
+    assert "theta_r 20" in found.reason
+
+
+def test_not_identifiable() -> None:
+    found = choose(scan("lambert", 1, albedo=0.8), models=["lambert+torrance_sparrow"])
+    assert found.chosen == "lambert+torrance_sparrow"
+    assert found.verdict == "not identifiable"
+    assert "sigma_deg" in found.reason
+    entry = to_json(found)["candidates"][0]["parameters"]["sigma_deg"]
+    assert entry["u"] is None
+    assert entry["interval"] == [0.5, 60.0]
+
+
+def test_without_stated_u() -> None:
+    m = scan(GLOSS, 1, albedo=0.75, sigma_deg=42, ks=0.34)
+    found = choose(Measurements.bare(m.theta_i_deg, m.theta_r_deg, m.dphi_deg, m.brdf))
+    assert (found.chosen, found.verdict) == (GLOSS, "adequate")
+    rng = np.random.default_rng(0)
+    wild = Measurements.bare(m.theta_i_deg, m.theta_r_deg, 0.0, rng.uniform(0.05, 0.3, m.size))
+    assert choose(wild).verdict == "none adequate"
+
+
+@pytest.mark.parametrize("name", ["lambert", "oren_nayar_qualitative", "oren_nayar", GLOSS])
+def test_data_without_noise(name: str) -> None:
+    truth = {p.name: 0.3 if p.name == "ks" else p.default for p in MODELS[name].parameters}
+    theta_i, theta_r, dphi = scan_angles()
+    geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
+    value = MODELS[name].brdf(geometry, **truth)
+    found = choose(Measurements.bare(theta_i, theta_r, dphi, value))
+    assert (found.chosen, found.verdict) == (name, "adequate")
+    best = next(c for c in found.candidates if c.model == name)
+    assert dict(best.values) == pytest.approx(truth, rel=1e-4)
+
+
+def test_json_as_agreed() -> None:
+    found = choose(scan("lambert", 1, albedo=0.8))
+    written = to_json(found)
+    assert json.loads(json.dumps(written, allow_nan=False)) == written
+    assert list(written) == ["chosen", "verdict", "candidates"]
+    assert [c["model"] for c in written["candidates"]] == list(LADDER)
+    for candidate in written["candidates"]:
+        assert list(candidate) == [
+            "model", "parameters", "rms_relative", "reduced_chi2", "bic", "converged"
+        ]  # fmt: skip
+        for entry in candidate["parameters"].values():
+            assert set(entry) == ({"value", "u"} if entry["u"] else {"value", "u", "interval"})
+
+
+def test_few_points() -> None:
+    two = Measurements.bare(30, [0, 20], 0, 0.2, 1e-3)
+    found = choose(two)
+    assert found.chosen == "lambert"
+    assert "left out, too few points" in found.reason
+    assert [len(c.values) for c in found.candidates] == [1, 2, 2]
+    with pytest.raises(NotDetermined, match="too few to fit any"):
+        choose(two, models=[GLOSS])
+
+
+def test_unknown_models_are_named() -> None:
+    with pytest.raises(KeyError, match="phong"):
+        choose(scan("lambert", 1, albedo=0.8), models=["phong"])
+
+
+def test_bic_of_stated_u_is_chi2_and_penalty() -> None:
+    m = scan("lambert", 1, albedo=0.8)
+    for c in choose(m, models=["lambert", "oren_nayar"]).candidates:
+        assert c.bic == pytest.approx((c.chi2 or 0) + len(c.values) * math.log(m.size))
