@@ -1,0 +1,5 @@
+"""`python -m acquisition` is `gonio`."""
+
+from acquisition.cli import main
+
+main()

@@ -1,0 +1,63 @@
+"""One axis of the rig: a stage behind the rig file's zero, sign and limits."""
+
+from __future__ import annotations
+
+from instrument.clock import Clock
+from instrument.devices import Stage
+from instrument.errors import DeviceError
+from instrument.rig_config import HandAxis, SimulatedAxis
+
+LEAST_TOLERANCE_DEG = 0.01
+
+
+class Axis:
+    """Moves a stage in the rig's degrees; refuses what the rig file does not allow."""
+
+    def __init__(
+        self, name: str, stage: Stage, settings: HandAxis | SimulatedAxis, clock: Clock
+    ) -> None:
+        self.name, self._stage, self._settings, self._clock = name, stage, settings, clock
+        self._target_deg = float("nan")
+
+    @property
+    def by_hand(self) -> bool:
+        """Whether the operator moves this axis."""
+        return isinstance(self._settings, HandAxis)
+
+    def identity(self) -> str:
+        """Who answers."""
+        return self._stage.identity()
+
+    def home(self) -> None:
+        """Find the reference."""
+        self._stage.home()
+
+    def start_move(self, angle_deg: float) -> None:
+        """Begin to move; past a limit of the rig file nothing is sent to the device."""
+        low, high = self._settings.min_deg, self._settings.max_deg
+        if not low - 1e-9 <= angle_deg <= high + 1e-9:
+            raise DeviceError(
+                f"{self.name}: {angle_deg:g} deg is outside the rig's limits, {low:g} to "
+                f"{high:g} deg: nothing has moved"
+            )
+        self._target_deg = angle_deg
+        self._stage.start_move(self._settings.zero_deg + self._settings.sign * angle_deg)
+
+    def finish_move(self) -> None:
+        """Wait for the end of the move and check where the axis stands."""
+        reached = (self._stage.wait() - self._settings.zero_deg) * self._settings.sign
+        tolerance = max(3 * self._settings.u_deg, LEAST_TOLERANCE_DEG)
+        if abs(reached - self._target_deg) > tolerance:
+            raise DeviceError(
+                f"{self.name}: stands at {reached:g} deg instead of {self._target_deg:g} deg "
+                f"(allowed: {tolerance:g} deg off): look for what holds the stage, then go on"
+            )
+
+    def settle(self) -> None:
+        """Let the axis come to rest."""
+        if isinstance(self._settings, SimulatedAxis):
+            self._clock.sleep(self._settings.settle_s)
+
+    def stop(self) -> None:
+        """End all motion now."""
+        self._stage.stop()

@@ -1,0 +1,100 @@
+"""The command line, `gonio`. Heavy imports wait until a command needs them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from instrument.errors import GonioError, OperatorStop
+
+# The program's arrays are small: threads of the linear algebra would only wait for one another.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+app = typer.Typer(
+    help="Measure how a flat sample reflects light, and find the simplest model that explains it.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+ProtocolFile = Annotated[Path, typer.Argument(help="The protocol, a YAML file.")]
+RigFile = Annotated[
+    Path | None, typer.Option("--rig", help="A rig file in place of the one the protocol names.")
+]
+RunFolder = Annotated[Path, typer.Argument(help="The folder of a run.")]
+OutFolder = Annotated[
+    Path | None,
+    typer.Option("--out", help="The run's folder, absent or empty. Default: runs/NAME-DATE-TIME."),
+]
+Json = Annotated[
+    bool, typer.Option("--json", help="Print the result as JSON, and nothing else, on stdout.")
+]
+
+
+@app.command()
+def run(
+    protocol: ProtocolFile, rig: RigFile = None, out: OutFolder = None, json: Json = False
+) -> None:
+    """Run a scan from a protocol: measure, fit, report."""
+    from acquisition.run import run_protocol
+
+    _do(lambda: run_protocol(protocol, rig, out, json))
+
+
+@app.command()
+def plan(protocol: ProtocolFile, rig: RigFile = None, json: Json = False) -> None:
+    """Show what a scan would do and how long it takes; no device is touched."""
+    from acquisition.run import show_plan
+
+    _do(lambda: show_plan(protocol, rig, json))
+
+
+@app.command()
+def resume(
+    folder: RunFolder,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="The rig is ready to move: do not ask.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Go on with a run that was stopped, at the first geometry that is not in its record."""
+    from acquisition.run import resume_run
+
+    _do(lambda: resume_run(folder, yes, json))
+
+
+@app.command()
+def report(folder: RunFolder, json: Json = False) -> None:
+    """Fit a finished run again and write its tables and its report anew."""
+    from acquisition.run import report_run
+
+    _do(lambda: report_run(folder, json))
+
+
+def main() -> None:
+    """Entry point of the `gonio` command."""
+    signal.signal(signal.SIGTERM, _as_interrupt)
+    app()
+
+
+def _as_interrupt(number: int, frame: object) -> None:  # noqa: ARG001 - a signal handler's form
+    raise KeyboardInterrupt
+
+
+def _do(command: Callable[[], None]) -> None:
+    """Run a command; what is expected to go wrong becomes a message and an exit code."""
+    try:
+        command()
+    except GonioError as error:
+        sys.stderr.write(f"{error}\n")
+        raise typer.Exit(error.exit_code) from None
+    except KeyboardInterrupt:
+        sys.stderr.write("stopped by the operator\n")
+        raise typer.Exit(OperatorStop.exit_code) from None

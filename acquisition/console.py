@@ -1,0 +1,105 @@
+"""What a person sees in the terminal: the plan, the progress, the result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from acquisition.plan import Plan, Step, lamp_settings
+from instrument.config import Loaded
+
+if TYPE_CHECKING:
+    from acquisition.results import Outcome
+
+# Progress and prompts go to standard error: standard output may be JSON.
+console = Console(stderr=True)
+out = Console()
+
+
+def duration_text(seconds: float) -> str:
+    """Seconds as an operator would say it."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes:02d} min"
+    return f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"
+
+
+@contextmanager
+def progress(plan: Plan, done_steps: int) -> Iterator[Callable[[Step], None]]:
+    """A bar over the planned time, with the time left; yields what to call after each step."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("time left"),
+        TimeRemainingColumn(compact=True),
+    )
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task("scan", total=len(plan.steps), completed=done_steps)
+
+        def on_step(step: Step) -> None:
+            bar.update(task, advance=1, description=_where(step))
+
+        yield on_step
+
+
+def _where(step: Step) -> str:
+    what = {"point": "", "tile": "white tile ", "drift": "drift check "}[step.kind]
+    return f"{what}θ_i {step.pose.theta_i:g}° θ_r {step.pose.theta_r:g}°"
+
+
+def print_plan(loaded: Loaded, plan: Plan) -> None:
+    """What the scan would do, before it does it."""
+    out.print(f"{loaded.protocol.name}: {loaded.protocol.description}", highlight=False)
+    table = Table("", "", show_header=False, box=None)
+    for row in _plan_rows(loaded, plan):
+        table.add_row(*row)
+    out.print(table)
+    lamp = Table("lamp", "theta_i (deg)", "dphi (deg)", "points", "view angles (deg)")
+    for number, theta_i, dphi in lamp_settings(plan):
+        views = [s.pose.theta_r for s in plan.points if s.lamp_setting == number]
+        span = f"{min(views):g} … {max(views):g}" if views else ""
+        lamp.add_row(str(number + 1), f"{theta_i:g}", f"{dphi:g}", str(len(views)), span)
+    out.print(lamp)
+
+
+def _plan_rows(loaded: Loaded, plan: Plan) -> Iterator[tuple[str, str]]:
+    tiles = sum(step.kind == "tile" for step in plan.steps)
+    drifts = sum(step.kind == "drift" for step in plan.steps)
+    yield "rig", f"{loaded.rig.name} ({'simulated' if loaded.rig.simulated else 'real'})"
+    yield "geometries", f"{len(plan.points)} to measure"
+    hidden = ", ".join(f"({p.theta_i:g}, {p.dphi:g}, {p.theta_r:g})" for p in plan.hidden[:6])
+    more = " …" if len(plan.hidden) > 6 else ""
+    yield (
+        "left out",
+        f"{len(plan.hidden)} where camera and lamp hide one another"
+        + (f": (theta_i, dphi, theta_r) = {hidden}{more}" if hidden else ""),
+    )
+    yield "references", f"{tiles} white tile, {drifts} drift checks"
+    yield (
+        "operator",
+        f"places sample or tile {plan.swaps} times, sets the lamp {plan.hand_settings} times"
+        + (", covers it once" if plan.darks_first_s else ""),
+    )
+    yield "duration", f"about {duration_text(plan.duration_s)}"
+
+
+def print_outcome(outcome: Outcome) -> None:
+    """Which model was chosen, its parameters with uncertainty, and where the report is."""
+    from acquisition.remarks import value_text
+
+    out.print(outcome.headline, highlight=False)
+    if outcome.parameters:
+        table = Table("parameter", "value ± u (k = 1)")
+        for parameter in outcome.parameters:
+            table.add_row(parameter.name, value_text(parameter))
+        out.print(table)
+    for note in outcome.notes:
+        out.print(f"- {note}", highlight=False)
+    out.print(f"report: {outcome.report}", highlight=False, soft_wrap=True)

@@ -1,0 +1,94 @@
+"""From reduced readings to the choice of a model: what the fit sees, and what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.reduction import Reduced
+from analysis.acceptance import Acceptance
+from analysis.choice import LADDER, Choice, choose
+from analysis.fit import FitResult, fit
+from analysis.measurements import Measurements
+from analysis.models import MODELS
+from instrument.config import Loaded
+from instrument.errors import NotDetermined
+from instrument.geometry import FloatArray
+
+NO_TILE = (
+    "no white tile was measured, so the radiance is relative and no BRDF can be fitted; "
+    "add references.white_tile to the protocol"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """The choice, or None and the reason why there is none; `used` marks the fitted points (N,)."""
+
+    choice: Choice | None
+    used: NDArray[np.bool_]
+    reason: str
+
+    @property
+    def chosen(self) -> FitResult | None:
+        """The chosen candidate."""
+        if self.choice is None or self.choice.chosen is None:
+            return None
+        return next(c for c in self.choice.candidates if c.model == self.choice.chosen)
+
+    def u_brdf(self, reduced: Reduced) -> FloatArray:
+        """Standard uncertainty of every BRDF (N,), 1/sr: with the angles' share where fitted."""
+        relative2 = reduced.u_random**2 + reduced.u_placement**2 + reduced.u_reference**2
+        u: FloatArray = np.abs(reduced.brdf) * np.sqrt(relative2 + reduced.u_tile**2)
+        if self.chosen is not None:
+            u[self.used] = self.chosen.u_total
+        return u
+
+
+def fit_run(reduced: Reduced, loaded: Loaded) -> Fitted:
+    """Fit the sound points; what keeps a fit from being made is said, not raised."""
+    if loaded.protocol.references.white_tile is None:
+        return Fitted(None, reduced.sound, NO_TILE)
+    models = loaded.protocol.fit.models or LADDER
+    acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
+    try:
+        choice = choose(measurements(reduced, loaded), acceptance, models)
+    except NotDetermined as error:
+        return Fitted(None, reduced.sound, str(error))
+    return Fitted(choice, reduced.sound, choice.reason)
+
+
+def u_without(
+    component: str, reduced: Reduced, chosen: FitResult, loaded: Loaded
+) -> Mapping[str, float | None]:
+    """Uncertainties of the chosen model's parameters if one component of u were not there."""
+    finer = measurements(reduced, loaded, without=(component,))
+    acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
+    return fit(MODELS[chosen.model], finer, acceptance=acceptance).u
+
+
+def measurements(reduced: Reduced, loaded: Loaded, without: Sequence[str] = ()) -> Measurements:
+    """The sound points as the fit sees them, `without` some components of their uncertainty."""
+    keep = reduced.sound
+    points = [p for p, kept in zip(reduced.points, keep, strict=True) if kept]
+    parts = [u[keep] ** 2 for name, u in reduced.components.items() if name not in without]
+    axes, brdf = loaded.rig.axes, reduced.brdf[keep]
+    return Measurements(
+        np.array([p.theta_i_deg for p in points]),
+        np.array([p.theta_r_deg for p in points]),
+        np.array([p.dphi_deg for p in points]),
+        brdf,
+        np.sqrt(np.sum(parts, axis=0)) * brdf,
+        lamp_setting=np.array([p.lamp_setting for p in points], dtype=np.int64),
+        reference=reduced.reference[keep],
+        u_reference=reduced.u_reference[keep],
+        u_tile=reduced.u_tile,
+        placement=np.array([p.block for p in points], dtype=np.int64),
+        u_placement=reduced.u_placement[keep],
+        u_theta_i_deg=axes.theta_i.u_deg,
+        u_theta_r_deg=axes.theta_r.u_deg,
+        u_dphi_deg=axes.dphi.u_deg,
+    )

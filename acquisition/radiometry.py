@@ -1,0 +1,141 @@
+"""From frames to the mean count of the window, with its uncertainty and its flags."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.exposure import NEARLY_FULL
+from acquisition.window import Window
+from instrument.devices import Frame
+from instrument.geometry import FloatArray
+from instrument.rig_config import Camera
+
+
+@dataclass(frozen=True, slots=True)
+class Dark:
+    """The dark of one exposure: mean of every pixel, its variance, over so many frames (DN)."""
+
+    exposure_s: float
+    mean: FloatArray
+    variance: FloatArray
+    frames: int
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """What a window gave, in counts (DN); the u are standard uncertainties of `signal_dn`.
+
+    `u_placement_dn` has the sign of the change for a sample that stands too near the camera.
+    """
+
+    signal_dn: float
+    u_noise_dn: float
+    u_quantisation_dn: float
+    u_placement_dn: float
+    saturated_pixels: int
+    peak_dn: float
+    flags: str
+
+
+def dark_of(frames: Sequence[Frame], camera: Camera) -> Dark:
+    """The dark of a series of frames taken without light."""
+    mean, variance = _mean_and_variance([frame.image for frame in frames], camera)
+    return Dark(frames[0].exposure_s, mean, variance, len(frames))
+
+
+def measure(
+    frames: Sequence[Frame],
+    dark: Dark,
+    window: Window,
+    camera: Camera,
+    u_placement_mm: float,
+    min_pixels: int,
+) -> Signal:
+    """The window's mean over all frames, less the dark, with uncertainty and flags."""
+    crops = [frame.image[window.crop] for frame in frames]
+    mean, variance = _mean_and_variance(crops, camera)
+    signal = window.mean(mean - dark.mean[window.crop])
+    counted = window.weights > 0
+    saturated = int(sum(np.count_nonzero(crop[counted] >= camera.max_dn) for crop in crops))
+    peak = float(np.percentile(mean[counted], 99)) if window.weights.size else float("nan")
+    return Signal(
+        signal,
+        _noise(window, variance / len(frames) + dark.variance[window.crop] / dark.frames),
+        _quantisation(window, variance, dark),
+        u_placement_mm * window.columns_per_mm * _slope_per_column(window, frames, dark),
+        saturated,
+        peak,
+        _flags(window, min_pixels, saturated, peak, camera),
+    )
+
+
+def _mean_and_variance(
+    crops: Sequence[np.ndarray[tuple[int, ...], np.dtype[np.uint8 | np.uint16]]], camera: Camera
+) -> tuple[FloatArray, FloatArray]:
+    """Mean and variance from frame to frame of every pixel, DN and DN^2.
+
+    A single frame shows no variance: the photon-transfer curve of the rig file stands in for it.
+    """
+    stack = np.asarray(crops, dtype=np.float64)
+    mean: FloatArray = stack.mean(axis=0)
+    if len(crops) > 1:
+        return mean, stack.var(axis=0, ddof=1)
+    gain = camera.electrons_per_dn
+    electrons = np.maximum(mean - camera.black_level_dn, 0.0) * gain
+    return mean, (electrons + camera.read_noise_electrons**2) / gain**2
+
+
+def _noise(window: Window, variance: FloatArray) -> float:
+    """Standard uncertainty of the weighted mean of independent pixels."""
+    return float(np.sqrt(np.sum(window.weights**2 * variance)))
+
+
+def _quantisation(window: Window, variance: FloatArray, dark: Dark) -> float:
+    """Standard uncertainty that rounding to whole counts leaves, in frames and dark together."""
+    lit = rounding_u_dn(window.mean(variance))
+    unlit = rounding_u_dn(window.mean(dark.variance[window.crop]))
+    return float(np.hypot(lit, unlit))
+
+
+def rounding_u_dn(noise_variance_dn2: float) -> float:
+    """Error (standard deviation, DN) of the mean of many counts rounded to whole numbers.
+
+    Without noise every pixel rounds alike: 1/sqrt(12) DN. Normal noise of variance s^2 dithers it:
+    the Fourier series of the sawtooth error, its k-th term damped by exp(-2 pi^2 k^2 s^2)
+    (Widrow and Kollar, Quantization Noise, 2008, chapter 4), averaged over all levels.
+    """
+    k = np.arange(1, 2000)
+    damped = np.exp(-4 * np.pi**2 * k**2 * noise_variance_dn2) / (2 * np.pi**2 * k**2)
+    return float(np.sqrt(damped.sum()))
+
+
+def _slope_per_column(window: Window, frames: Sequence[Frame], dark: Dark) -> float:
+    """How fast the window's mean changes when the window moves along a row, DN per pixel."""
+    rows, columns = window.crop
+    if not window.inside_frame or columns.start < 1 or columns.stop >= dark.mean.shape[1]:
+        return 0.0
+    left, right = (
+        window.mean(
+            np.mean([frame.image[rows, _shift(columns, by)] for frame in frames], axis=0)
+            - dark.mean[rows, _shift(columns, by)]
+        )
+        for by in (-1, 1)
+    )
+    return (right - left) / 2
+
+
+def _shift(columns: slice, by: int) -> slice:
+    return slice(columns.start + by, columns.stop + by)
+
+
+def _flags(window: Window, min_pixels: int, saturated: int, peak_dn: float, camera: Camera) -> str:
+    """What is wrong with the reading, separated by semicolons; empty when nothing is."""
+    flags = {
+        "window leaves frame": not window.inside_frame,
+        "too few pixels": window.pixels < min_pixels,
+        "saturated": saturated > 0 or peak_dn >= NEARLY_FULL * camera.max_dn,
+    }
+    return "; ".join(name for name, raised in flags.items() if raised)

@@ -1,0 +1,133 @@
+"""What the results say in words: the headline, the notes, the uncertainty budget."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from acquisition.fitting import Fitted, u_without
+from acquisition.reduction import ROUNDING, Reduced
+from analysis.fit import FitResult
+from analysis.models import MODELS
+from analysis.report_data import Parameter
+from analysis.report_style import format_value
+from instrument.config import Loaded
+from instrument.geometry import FloatArray
+from instrument.record import Record
+
+Budget = tuple[tuple[str, float, float], ...]
+
+FEW_BITS = 8
+_UNITS = {"degrees": "°", "1": ""}
+_VERDICTS = {
+    "adequate": "it explains the data within their uncertainty",
+    "none adequate": "but none of the models explains the data within their uncertainty",
+    "not identifiable": "but the data do not determine all of its parameters",
+}
+
+
+def headline(fitted: Fitted) -> str:
+    """Which model was chosen, its parameters and the verdict, in one sentence."""
+    chosen, choice = fitted.chosen, fitted.choice
+    if chosen is None or choice is None:
+        return f"No model was fitted: {fitted.reason}."
+    values = ", ".join(f"{p.name} {value_text(p)}" for p in parameters_of(chosen))
+    return f"{chosen.model}: {values}; {_VERDICTS[choice.verdict]}."
+
+
+def value_text(parameter: Parameter) -> str:
+    """A parameter's value with its uncertainty, or the interval that is all one can say."""
+    if parameter.u is not None:
+        return format_value(parameter.value, parameter.u, parameter.unit)
+    low, high = parameter.interval or (np.nan, np.nan)
+    return f"not determined, within [{low:.4g}, {high:.4g}] {parameter.unit}".rstrip()
+
+
+def parameters_of(result: FitResult) -> tuple[Parameter, ...]:
+    """A candidate's parameters in the model's order."""
+    return tuple(
+        Parameter(
+            name=p.name,
+            value=result.values[p.name],
+            u=result.u[p.name],
+            interval=result.intervals.get(p.name),
+            unit=_UNITS.get(p.unit, p.unit),
+        )
+        for p in MODELS[result.model].parameters
+    )
+
+
+def budget(reduced: Reduced, u_brdf: FloatArray) -> Budget:
+    """Rows of (component, median relative u in %, share of the variance in %), largest first."""
+    known = np.isfinite(reduced.brdf)
+    parts = {name: u**2 for name, u in reduced.components.items()}
+    parts["sample placement"] = reduced.u_placement**2
+    if known.any():
+        parts["white tile's reading"] = reduced.u_reference**2
+        parts["white tile's certificate"] = np.full(known.shape, reduced.u_tile**2)
+        total = (u_brdf / reduced.brdf) ** 2
+        rest = total - np.sum(list(parts.values()), axis=0)
+        parts["angle setting"] = np.maximum(rest, 0.0)  # what the fit's total has beyond them
+        parts = {name: part[known] for name, part in parts.items()}
+    whole = sum(float(np.mean(p)) for p in parts.values())
+    rows = [
+        (name, 100 * float(np.median(np.sqrt(p))), 100 * float(np.mean(p)) / whole)
+        for name, p in parts.items()
+    ]
+    return tuple(sorted(rows, key=lambda row: -row[2]))
+
+
+def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> tuple[str, ...]:
+    """What else the operator should know."""
+    tile = "the white tile is taken as Lambertian" if reduced.u_tile else ""
+    found = (
+        fitted.reason if fitted.choice is not None else "",
+        _hidden_note(record),
+        _flag_note(reduced),
+        _drift_note(reduced),
+        _bits_note(reduced, fitted, loaded),
+        tile,
+        "all data are simulated" if loaded.rig.simulated else "",
+    )
+    return tuple(note for note in found if note)
+
+
+def _hidden_note(record: Record) -> str:
+    hidden = int(record.meta("hidden") or 0)
+    return f"{hidden} geometries left out: camera and lamp hide one another" if hidden else ""
+
+
+def _flag_note(reduced: Reduced) -> str:
+    flagged = [flags for flags in reduced.flags if flags]
+    if not flagged:
+        return ""
+    kinds = ", ".join(sorted({kind for flags in flagged for kind in flags.split("; ")}))
+    return f"{len(flagged)} of {len(reduced.flags)} points are flagged and not fitted: {kinds}"
+
+
+def _drift_note(reduced: Reduced) -> str:
+    if not reduced.drift:
+        return "no drift check was made: the lamp is taken as constant"
+    levels = [level for _, level in reduced.drift]
+    percent = 100 * (max(levels) - min(levels))
+    return f"the lamp's drift was followed and taken out: {percent:.2f} % over the scan"
+
+
+def _bits_note(reduced: Reduced, fitted: Fitted, loaded: Loaded) -> str:
+    """What a camera of few bits costs: its share of u, and what the parameters lose by it."""
+    bits = loaded.rig.camera.bit_depth
+    if bits > FEW_BITS or fitted.chosen is None:
+        return ""
+    rounding = reduced.components[ROUNDING][fitted.used]
+    share = float(np.median(rounding**2 / reduced.u_random[fitted.used] ** 2))
+    text = (
+        f"what {bits} bits cost: rounding to whole counts gives every point a relative u of "
+        f"{100 * np.median(rounding):.2g} % (median; worst {100 * rounding.max():.2g} %), "
+        f"{100 * share:.0f} % of the variance that points do not share"
+    )
+    better = u_without(ROUNDING, reduced, fitted.chosen, loaded)
+    gains = [
+        f"u({name}) would be {u:.2g} instead of {now:.2g}"
+        for name, u in better.items()
+        if u is not None and (now := fitted.chosen.u[name]) is not None
+    ]
+    return f"{text}; without it {', '.join(gains)}" if gains else text

@@ -1,0 +1,191 @@
+"""The commands that scan: what `gonio run`, `plan`, `resume` and `report` do."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import json
+import sys
+import threading
+from collections.abc import Mapping
+from dataclasses import asdict
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+
+from acquisition.console import (
+    console,
+    duration_text,
+    print_outcome,
+    print_plan,
+    progress,
+)
+from acquisition.engine import Engine
+from acquisition.models import check_model
+from acquisition.plan import Plan, make_plan
+from acquisition.rig import open_devices
+from instrument.config import Loaded, load_protocol
+from instrument.errors import DeviceError, InputError, OperatorStop
+from instrument.files import write_whole
+from instrument.record import Record
+
+PROTOCOL_FILE, RIG_FILE = "protocol.yaml", "rig.yaml"
+
+
+def run_protocol(
+    protocol_path: Path, rig_path: Path | None, out: Path | None, as_json: bool
+) -> None:
+    """Plan, scan, fit, report. Raises `InputError` before anything moves, or what the scan met."""
+    loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
+    plan = make_plan(loaded)
+    folder = out if out is not None else _default_folder(loaded)
+    with Record.create(folder, _meta(loaded, plan)) as record:
+        write_whole(folder / PROTOCOL_FILE, loaded.protocol_text)
+        write_whole(folder / RIG_FILE, loaded.rig_text)
+        _scan(loaded, plan, record)
+        _finish(record, loaded, as_json)
+
+
+def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
+    """Go on with a stopped run; a finished one is fitted and reported again."""
+    with Record.open(folder) as record:
+        loaded = _as_used(folder)
+        _same_files(record, loaded)
+        plan = make_plan(loaded)
+        done = frozenset(reading.step for reading in record.readings())
+        if len(done) < len(plan.steps):
+            _confirm(yes, len(plan.steps) - len(done))
+            _scan(loaded, plan, record, done)
+        _finish(record, loaded, as_json)
+
+
+def report_run(folder: Path, as_json: bool) -> None:
+    """Fit a run again and write its tables and report anew; touches no device."""
+    with Record.open(folder) as record:
+        _finish(record, _as_used(folder), as_json)
+
+
+def show_plan(protocol_path: Path, rig_path: Path | None, as_json: bool) -> None:
+    """Print what a scan would do; touches no device."""
+    loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
+    plan = make_plan(loaded)
+    if as_json:
+        sys.stdout.write(json.dumps(_plan_json(plan), allow_nan=False) + "\n")
+    else:
+        print_plan(loaded, plan)
+
+
+def _plan_json(plan: Plan) -> dict[str, object]:
+    return {
+        "points": len(plan.points),
+        "hidden": [pose._asdict() for pose in plan.hidden],
+        "duration_s": plan.duration_s,
+        "surface_changes": plan.swaps,
+        "hand_settings": plan.hand_settings,
+        "steps": [asdict(step) | {"pose": step.pose._asdict()} for step in plan.steps],
+    }
+
+
+def _scan(loaded: Loaded, plan: Plan, record: Record, done: frozenset[int] = frozenset()) -> None:
+    """Run the plan; whatever ends it early is in the record and in the message."""
+    devices = open_devices(loaded)
+    console.print(
+        f"{loaded.protocol.name}: {len(plan.points)} geometries, about "
+        f"{duration_text(plan.duration_s)} on the rig ({loaded.rig.name}), into {record.folder}",
+        highlight=False,
+        soft_wrap=True,
+    )
+    start_s = devices.clock.now_s()
+    threading.Thread(target=_load_analysis, daemon=True).start()
+    try:
+        with progress(plan, len(done)) as on_step:
+            Engine(loaded.protocol, loaded.rig, devices, record, on_step).run(plan, done)
+    except KeyboardInterrupt:
+        _note(record, "stopped", "by the operator")
+        raise OperatorStop(
+            f"stopped by the operator: all motion has ended. {_go_on(record)}"
+        ) from None
+    except DeviceError as error:
+        _note(record, "fault", str(error))
+        raise DeviceError(f"{error}\n{_go_on(record)}") from error
+    _note(record, "finished", f"{len(plan.steps)} steps")
+    record.set_meta("scan_s", f"{devices.clock.now_s() - start_s:.1f}")
+    record.set_meta("finished_utc", devices.clock.utc().isoformat(timespec="seconds"))
+
+
+def _go_on(record: Record) -> str:
+    return (
+        f"{len(record.readings())} readings are safe in {record.folder}. Go on with: "
+        f"gonio resume {record.folder}"
+    )
+
+
+def _note(record: Record, kind: str, text: str) -> None:
+    record.add_event(datetime.now(UTC).isoformat(), kind, text)
+
+
+def _load_analysis() -> None:
+    """Import what the end of a run needs, while the rig is busy."""
+    for name in ("acquisition.results", "matplotlib.figure", "matplotlib.backends.backend_svg"):
+        importlib.import_module(name)
+
+
+def _finish(record: Record, loaded: Loaded, as_json: bool) -> None:
+    """Reduce, fit, report and say what came out."""
+    from acquisition.results import finish
+
+    outcome = finish(record, loaded)
+    if as_json:
+        sys.stdout.write(json.dumps(outcome.fit, allow_nan=False) + "\n")
+    else:
+        print_outcome(outcome)
+
+
+def _default_folder(loaded: Loaded) -> Path:
+    now = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
+    return Path("runs") / f"{loaded.protocol_path.stem}-{now}"
+
+
+def _meta(loaded: Loaded, plan: Plan) -> Mapping[str, str]:
+    return {
+        "protocol_file": str(loaded.protocol_path),
+        "rig_file": str(loaded.rig_path),
+        "protocol": loaded.protocol_text,
+        "rig": loaded.rig_text,
+        "protocol_sha256": _digest(loaded.protocol_text),
+        "rig_sha256": _digest(loaded.rig_text),
+        "program_version": version("gonio"),
+        "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "planned_s": f"{plan.duration_s:.1f}",
+        "hidden": str(len(plan.hidden)),
+        "steps": str(len(plan.steps)),
+    }
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _as_used(folder: Path) -> Loaded:
+    """The run's own copies of protocol and rig."""
+    return load_protocol(folder / PROTOCOL_FILE, folder / RIG_FILE, check_model=check_model)
+
+
+def _same_files(record: Record, loaded: Loaded) -> None:
+    for key, text in (("protocol", loaded.protocol_text), ("rig", loaded.rig_text)):
+        if record.meta(f"{key}_sha256") != _digest(text):
+            raise InputError(
+                f"{record.folder / (key + '.yaml')}: changed since the run began, so its readings "
+                "would not belong together: restore it, or start a new run"
+            )
+
+
+def _confirm(yes: bool, steps: int) -> None:
+    """Nothing moves again until the operator has said so."""
+    question = f"{steps} readings are missing. Is the rig clear, may the stage move? [y/N] "
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise InputError("gonio resume: nobody to ask whether the rig may move: add --yes")
+    if console.input(question).strip().lower() not in ("y", "yes"):
+        raise OperatorStop("not resumed: nothing has moved")
