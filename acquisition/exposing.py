@@ -9,7 +9,7 @@ import numpy as np
 
 from acquisition.exposure import NEARLY_FULL, longest_below
 from acquisition.plan import Step
-from acquisition.radiometry import Dark, dark_of
+from acquisition.radiometry import Dark, bright_level, dark_of
 from acquisition.window import Window
 from instrument.clock import Clock
 from instrument.devices import Camera, Frame, Lamp, Surface
@@ -79,10 +79,10 @@ class Exposer:
 
     def _suiting_s(self, step: Step, frame: Frame, window: Window) -> float:
         """The exposure that this frame's brightness asks for."""
-        counted = frame.image[window.crop][window.weights > 0]
+        counted = frame.image[window.crop][window.counted]
         if not counted.size:
             return frame.exposure_s
-        camera, peak = self.rig.camera, float(np.percentile(counted, 99))
+        camera, peak = self.rig.camera, bright_level(counted)
         if peak >= NEARLY_FULL * camera.max_dn:  # how far over the top cannot be seen
             return longest_below(frame.exposure_s / 4, camera)
         rate = max(peak - camera.black_level_dn, 0.5) / frame.exposure_s

@@ -17,5 +17,5 @@ def preview_of(exposed: Exposed, window: Window, max_dn: int) -> Preview:
     png = cv2.imencode(".png", np.clip(small, 0, 255).astype(np.uint8))[1].tobytes()
     outline = (window.outline_px + 0.5) / 2 - 0.5
     pose = exposed.step.pose
-    caption = f"θ_i {pose.theta_i:g}°, Δφ {pose.dphi:g}°, view angle θ_r {pose.theta_r:g}°"
+    caption = f"θᵢ {pose.theta_i:g}°, Δφ {pose.dphi:g}°, view angle θᵣ {pose.theta_r:g}°"
     return Preview(exposed.step.index, caption, png, outline.tolist())

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.exposure import NEARLY_FULL
 from acquisition.window import Window
-from instrument.devices import Frame
+from instrument.devices import Frame, Image
 from instrument.geometry import FloatArray
 from instrument.rig_config import Camera
 
@@ -46,6 +48,12 @@ def dark_of(frames: Sequence[Frame], camera: Camera) -> Dark:
     return Dark(frames[0].exposure_s, mean, variance, len(frames))
 
 
+def bright_level(counts: NDArray[Any]) -> float:
+    """The level that one count in a hundred exceeds: what an exposure is judged by."""
+    rank = int(0.99 * (counts.size - 1))
+    return float(np.partition(counts.ravel(), rank)[rank])
+
+
 def measure(
     frames: Sequence[Frame],
     dark: Dark,
@@ -56,33 +64,37 @@ def measure(
 ) -> Signal:
     """The window's mean over all frames, less the dark, with uncertainty and flags."""
     crops = [frame.image[window.crop] for frame in frames]
+    counted = [crop[window.counted] for crop in crops]
     mean, variance = _mean_and_variance(crops, camera)
-    signal = window.mean(mean - dark.mean[window.crop])
-    counted = window.weights > 0
-    saturated = int(sum(np.count_nonzero(crop[counted] >= camera.max_dn) for crop in crops))
-    peak = float(np.percentile(mean[counted], 99)) if window.weights.size else float("nan")
+    saturated = sum(int(np.count_nonzero(counts >= camera.max_dn)) for counts in counted)
+    peak = bright_level(counted[0]) if counted[0].size else float("nan")
+    slope = _slope_per_column(frames, dark, window)
     return Signal(
-        signal,
+        window.mean(mean - dark.mean[window.crop]),
         _noise(window, variance / len(frames) + dark.variance[window.crop] / dark.frames),
         _quantisation(window, variance, dark),
-        u_placement_mm * window.columns_per_mm * _slope_per_column(window, frames, dark),
+        u_placement_mm * window.columns_per_mm * slope,
         saturated,
         peak,
         _flags(window, min_pixels, saturated, peak, camera),
     )
 
 
-def _mean_and_variance(
-    crops: Sequence[np.ndarray[tuple[int, ...], np.dtype[np.uint8 | np.uint16]]], camera: Camera
-) -> tuple[FloatArray, FloatArray]:
+def _mean_and_variance(images: Sequence[Image], camera: Camera) -> tuple[FloatArray, FloatArray]:
     """Mean and variance from frame to frame of every pixel, DN and DN^2.
 
+    Sums of counts and of their squares are whole numbers far below 2^53, so nothing is rounded.
     A single frame shows no variance: the photon-transfer curve of the rig file stands in for it.
     """
-    stack = np.asarray(crops, dtype=np.float64)
-    mean: FloatArray = stack.mean(axis=0)
-    if len(crops) > 1:
-        return mean, stack.var(axis=0, ddof=1)
+    count = len(images)
+    total, squares = (np.zeros(images[0].shape) for _ in range(2))
+    for image in images:
+        counts = image.astype(np.float64)
+        total += counts
+        squares += np.square(counts, out=counts)
+    mean = total / count
+    if count > 1:
+        return mean, (squares - total * mean) / (count - 1)
     gain = camera.electrons_per_dn
     electrons = np.maximum(mean - camera.black_level_dn, 0.0) * gain
     return mean, (electrons + camera.read_noise_electrons**2) / gain**2
@@ -112,23 +124,16 @@ def rounding_u_dn(noise_variance_dn2: float) -> float:
     return float(np.sqrt(damped.sum()))
 
 
-def _slope_per_column(window: Window, frames: Sequence[Frame], dark: Dark) -> float:
+def _slope_per_column(frames: Sequence[Frame], dark: Dark, window: Window) -> float:
     """How fast the window's mean changes when the window moves along a row, DN per pixel."""
     rows, columns = window.crop
     if not window.inside_frame or columns.start < 1 or columns.stop >= dark.mean.shape[1]:
         return 0.0
-    left, right = (
-        window.mean(
-            np.mean([frame.image[rows, _shift(columns, by)] for frame in frames], axis=0)
-            - dark.mean[rows, _shift(columns, by)]
-        )
-        for by in (-1, 1)
-    )
-    return (right - left) / 2
-
-
-def _shift(columns: slice, by: int) -> slice:
-    return slice(columns.start + by, columns.stop + by)
+    left, right = (slice(columns.start + by, columns.stop + by) for by in (-1, 1))
+    image = frames[0].image  # one frame is enough for a part of the uncertainty
+    change = image[rows, right].astype(np.float64) - image[rows, left]
+    change -= dark.mean[rows, right] - dark.mean[rows, left]
+    return window.mean(change) / 2
 
 
 def _flags(window: Window, min_pixels: int, saturated: int, peak_dn: float, camera: Camera) -> str:

@@ -19,19 +19,18 @@ Budget = tuple[tuple[str, float, float], ...]
 FEW_BITS = 8
 _UNITS = {"degrees": "°", "1": ""}
 _VERDICTS = {
-    "adequate": "it explains the data within their uncertainty",
-    "none adequate": "but none of the models explains the data within their uncertainty",
-    "not identifiable": "but the data do not determine all of its parameters",
+    "adequate": "the simplest model that explains the data within their uncertainty",
+    "none adequate": "the best of the models, but none explains the data within their uncertainty",
+    "not identifiable": "agrees with the data, but they do not determine all of its parameters",
 }
+NOTABLE_PULL = 2.0
 
 
 def headline(fitted: Fitted) -> str:
-    """Which model was chosen, its parameters and the verdict, in one sentence."""
-    chosen, choice = fitted.chosen, fitted.choice
-    if chosen is None or choice is None:
+    """Which model was chosen and the verdict on it, in one sentence."""
+    if fitted.choice is None or fitted.chosen is None:
         return f"No model was fitted: {fitted.reason}."
-    values = ", ".join(f"{p.name} {value_text(p)}" for p in parameters_of(chosen))
-    return f"{chosen.model}: {values}; {_VERDICTS[choice.verdict]}."
+    return f"{fitted.chosen.model}: {_VERDICTS[fitted.choice.verdict]}."
 
 
 def value_text(parameter: Parameter) -> str:
@@ -84,6 +83,7 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         _hidden_note(record),
         _flag_note(reduced),
         _drift_note(reduced),
+        _pull_note(fitted),
         _bits_note(reduced, fitted, loaded),
         tile,
         "all data are simulated" if loaded.rig.simulated else "",
@@ -110,6 +110,13 @@ def _drift_note(reduced: Reduced) -> str:
     levels = [level for _, level in reduced.drift]
     percent = 100 * (max(levels) - min(levels))
     return f"the lamp's drift was followed and taken out: {percent:.2f} % over the scan"
+
+
+def _pull_note(fitted: Fitted) -> str:
+    """Shared errors that the fit puts further off than their u makes likely."""
+    pulls = fitted.chosen.pulls if fitted.chosen is not None else {}
+    far = [f"{name} by {pull:+.1f} u" for name, pull in pulls.items() if abs(pull) > NOTABLE_PULL]
+    return f"to agree with the model, the fit takes to be off: {', '.join(far)}" if far else ""
 
 
 def _bits_note(reduced: Reduced, fitted: Fitted, loaded: Loaded) -> str:

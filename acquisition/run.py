@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import importlib
 import json
 import sys
-import threading
 from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
+from acquisition.afterwards import Afterwards
 from acquisition.console import (
     console,
     duration_text,
@@ -42,8 +41,9 @@ def run_protocol(
     with Record.create(folder, _meta(loaded, plan)) as record:
         write_whole(folder / PROTOCOL_FILE, loaded.protocol_text)
         write_whole(folder / RIG_FILE, loaded.rig_text)
-        _scan(loaded, plan, record)
-        _finish(record, loaded, as_json)
+        with Afterwards(folder, as_json) as afterwards:
+            _scan(loaded, plan, record)
+            afterwards.finish()
 
 
 def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
@@ -96,7 +96,6 @@ def _scan(loaded: Loaded, plan: Plan, record: Record, done: frozenset[int] = fro
         soft_wrap=True,
     )
     start_s = devices.clock.now_s()
-    threading.Thread(target=_load_analysis, daemon=True).start()
     try:
         with progress(plan, len(done)) as on_step:
             Engine(loaded.protocol, loaded.rig, devices, record, on_step).run(plan, done)
@@ -122,12 +121,6 @@ def _go_on(record: Record) -> str:
 
 def _note(record: Record, kind: str, text: str) -> None:
     record.add_event(datetime.now(UTC).isoformat(), kind, text)
-
-
-def _load_analysis() -> None:
-    """Import what the end of a run needs, while the rig is busy."""
-    for name in ("acquisition.results", "matplotlib.figure", "matplotlib.backends.backend_svg"):
-        importlib.import_module(name)
 
 
 def _finish(record: Record, loaded: Loaded, as_json: bool) -> None:

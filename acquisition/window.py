@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from instrument.coverage import polygon_coverage
 from instrument.geometry import FloatArray
@@ -25,13 +26,15 @@ class Window:
     """Weights of the pixels of one view angle.
 
     `weights` (rows, columns) over `crop`; their sum is 1 but for the division by cos^4.
-    `outline_px` (4, 2) as (column, row); `pixels` is the number of whole pixels' worth.
+    `counted`: pixels of the crop with a weight. `outline_px` (4, 2) as (column, row); `pixels`
+    is the number of whole pixels' worth.
     `columns_per_mm` is how far the picture moves along a row per mm that the surface stands off
     the axis.
     """
 
     crop: tuple[slice, slice]
     weights: FloatArray
+    counted: NDArray[np.bool_]
     outline_px: FloatArray
     pixels: float
     inside_frame: bool
@@ -39,7 +42,7 @@ class Window:
 
     def mean(self, image: FloatArray) -> float:
         """Area-weighted mean of a picture's crop; nan where the window sees no pixel."""
-        return float(np.sum(self.weights * image)) if self.weights.size else float("nan")
+        return float(np.vdot(self.weights, image)) if self.pixels > 0 else float("nan")
 
 
 @lru_cache(maxsize=512)
@@ -51,12 +54,13 @@ def window_at(theta_r_deg: float, pinhole: Pinhole, width_mm: float, height_mm: 
     rows, columns = np.ogrid[coverage.crop]
     area = coverage.fraction * area_per_pixel_mm2(homography, columns, rows)
     total = float(area.sum())
-    weights = area / pinhole.cos4(columns, rows)
+    weights = area / pinhole.cos4(columns, rows) / total if total > 0 else area
     # A surface 1 mm towards the camera moves sideways in the picture by sin(theta_r).
     shift = np.sin(np.radians(theta_r_deg)) * pinhole.focal_px / pinhole.beam_length_mm
     return Window(
         coverage.crop,
-        weights / total if total > 0 else weights[:0],
+        weights,
+        weights > 0,
         outline,
         float(coverage.fraction.sum()),
         coverage.inside_frame,

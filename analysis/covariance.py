@@ -22,10 +22,12 @@ class Covariance:
 
     variance: (N,), independent variances, positive, in the square of the data's unit.
     common: (N, K), standard shifts by each shared error, in the data's unit.
+    names: what each shared error is, in words; empty where nobody has named them.
     """
 
     variance: FloatArray
     common: FloatArray
+    names: tuple[str, ...] = ()
     _basis: FloatArray = field(init=False, repr=False)
     _shrink: FloatArray = field(init=False, repr=False)
 
@@ -50,6 +52,13 @@ class Covariance:
         inner = self._basis.T @ y
         shrink = self._shrink if x.ndim == 1 else self._shrink[:, np.newaxis]
         return np.asarray(y - self._basis @ (shrink * inner))
+
+    def pulls(self, residual: FloatArray) -> FloatArray:
+        """The likeliest value of each shared error behind a residual (N,), in units of its u, (K,).
+
+        The mean of the errors' normal distribution given the residual: common^T C^-1 residual.
+        """
+        return np.asarray(self.common.T @ self.whiten(self.whiten(residual)))
 
     @property
     def u_total(self) -> FloatArray:
@@ -94,20 +103,22 @@ def shared(
         raise ValueError("u_random is not stated; allowed: a u_random in 1/sr for every point")
     f = own(m.geometry)
     groups = [
-        (_change(m, own, theta_i=m.u_theta_i_deg), m.lamp_setting),
-        (_change(m, own, dphi=m.u_dphi_deg), m.lamp_setting),
-        (f * m.u_reference, m.reference),
-        (f * m.u_tile, np.zeros(m.size, dtype=np.int64)),
+        ("theta_i, lamp setting", _change(m, own, theta_i=m.u_theta_i_deg), m.lamp_setting),
+        ("dphi, lamp setting", _change(m, own, dphi=m.u_dphi_deg), m.lamp_setting),
+        ("white tile, reading", f * m.u_reference, m.reference),
+        ("white tile, certificate", f * m.u_tile, np.zeros(m.size, dtype=np.int64)),
     ]
     if m.placement is not None and m.u_placement is not None:
-        groups.append((f * m.u_placement, m.placement))
+        groups.append(("sample, placement", f * m.u_placement, m.placement))
     variance = np.square(m.u_random) + np.square(_change(m, smooth, theta_r=m.u_theta_r_deg))
-    columns = []
-    for shift, group in groups:
+    columns, names = [], []
+    for name, shift, group in groups:
         alone, several = _columns(shift, group)
         variance = variance + np.square(alone)
         columns.append(several)
-    return Covariance(variance, np.concatenate(columns, axis=1))
+        count = several.shape[1]
+        names += [name] if count == 1 else [f"{name} {n + 1}" for n in range(count)]
+    return Covariance(variance, np.concatenate(columns, axis=1), tuple(names))
 
 
 def _columns(shift: FloatArray, group: IntArray) -> tuple[FloatArray, FloatArray]:

@@ -38,7 +38,9 @@ class FitResult:
     the 95 % profile-likelihood interval. undetermined: parameters that may lie anywhere in more
     than half of their domain. correlation: (K, K), NaN for a parameter without u.
     predicted: (N,) in 1/sr. u_total: (N,) in 1/sr, of each point, estimated from the residuals
-    where no u is stated. residuals: (N,), measured minus predicted, in units of u_total.
+    where no u is stated. residuals: (N,), measured minus predicted, less the likeliest
+    values of the errors that points share, in units of the part of u that they do not share.
+    pulls: those likeliest values by name, in units of their own u: beyond 2 or 3 one is suspect.
     chi2, reduced_chi2: None where no u is stated (or nothing is left over to test).
     bic: chi2 + K ln N, or N ln(rss / N) + K ln N where no u is stated.
     rms_relative: rms residual over mean BRDF. averaged: whether the model was averaged over the
@@ -54,6 +56,7 @@ class FitResult:
     predicted: FloatArray
     u_total: FloatArray
     residuals: FloatArray
+    pulls: Mapping[str, float]
     chi2: float | None
     dof: int
     reduced_chi2: float | None
@@ -118,7 +121,7 @@ def refined(
     dof = measurements.size - first.solution.x.size
     if measurements.u_random is not None and probability(whole.solution.chi2, dof) < UNLIKELY:
         misfit = max(1.0, first.solution.chi2 / dof)
-        wider = Covariance(covariance.variance * misfit, covariance.common)
+        wider = replace(covariance, variance=covariance.variance * misfit)
         whole = _solved(first, measurements, acceptance, wider)
     return _result(measurements, whole, covariance)
 
@@ -185,6 +188,8 @@ def _result(measurements: Measurements, whole: Averaged, covariance: Covariance)
     residual = measurements.brdf - predicted
     u_total = covariance.u_total * math.sqrt(noise)
     white = covariance.whiten(residual)
+    pulls = covariance.pulls(residual)
+    unshared = residual - covariance.common @ pulls
     chi2 = float(white @ white)
     dof = measurements.size - x.size
     stated = measurements.u_random is not None
@@ -198,7 +203,8 @@ def _result(measurements: Measurements, whole: Averaged, covariance: Covariance)
         correlation=known.correlation,
         predicted=predicted,
         u_total=u_total,
-        residuals=residual / u_total,
+        residuals=unshared / (covariance.u_independent * math.sqrt(noise)),
+        pulls=dict(zip(covariance.names, map(float, pulls), strict=False)),
         chi2=chi2 if stated else None,
         dof=dof,
         reduced_chi2=chi2 / dof if stated and dof else None,

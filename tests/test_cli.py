@@ -80,9 +80,7 @@ def test_the_fit_keeps_its_contract(finished: Path) -> None:
             assert parameter["u"] is not None or len(parameter["interval"]) == 2
 
 
-def test_the_person_is_told_the_model_and_where_the_report_is(
-    small: Path, tmp_path: Path
-) -> None:
+def test_the_person_is_told_the_model_and_where_the_report_is(small: Path, tmp_path: Path) -> None:
     done = gonio("run", small, "--out", tmp_path / "run")
     assert "oren_nayar+torrance_sparrow" in done.stdout
     assert re.search(r"sigma_deg\s.*±", done.stdout)

@@ -1,0 +1,64 @@
+"""What comes after the scan, made ready while it runs.
+
+Loading the fit and the charts takes about a second. A second process does it while the rig is
+busy, then waits for the word that the record is complete, and prints the outcome itself. When the
+scan ends in any other way its input closes, and it ends without having touched the run.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from types import TracebackType
+
+from instrument.errors import GonioError
+
+GO = "go\n"
+
+
+class Afterwards:
+    """The waiting process; use it with `with`, and call `finish` once the record is complete."""
+
+    def __init__(self, folder: Path, as_json: bool) -> None:
+        command = [sys.executable, "-m", "acquisition.afterwards", str(folder), str(int(as_json))]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, text=True)
+        self._folder = folder
+
+    def __enter__(self) -> Afterwards:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._process.communicate()
+
+    def finish(self) -> None:
+        """Fit, report, print; raises `GonioError` when that process fails."""
+        self._process.communicate(GO)
+        if self._process.returncode != 0:
+            raise GonioError(
+                f"{self._folder}: the record is complete, but fit and report have failed: "
+                f"gonio report {self._folder}"
+            )
+
+
+def main() -> None:
+    """The other side: load, wait for the word, finish the run."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the scan's business
+    from acquisition.run import report_run
+
+    for name in ("acquisition.results", "matplotlib.figure", "matplotlib.backends.backend_svg"):
+        importlib.import_module(name)
+    if sys.stdin.readline() == GO:
+        report_run(Path(sys.argv[1]), bool(json.loads(sys.argv[2])))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,191 @@
+"""How the report looks: colours and marks of the charts, values in words, the style sheet.
+
+Everything is made for the screen and for a black-and-white printer.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Dashes = str | tuple[float, tuple[float, ...]]
+
+# The palette of Okabe and Ito, which colour-blind readers can tell apart; yellow is left out.
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#AA4499", "#000000", "#B8860B", "#56B4E9")
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "p")
+_DASHES: tuple[Dashes, ...] = (
+    "-",
+    (0, (6, 2)),
+    (0, (6, 2, 1.5, 2)),
+    (0, (1.5, 1.5)),
+    (0, (9, 2, 1.5, 2, 1.5, 2)),
+)
+INK, GREY, GRID, BAND = "#222222", "#666666", "#DDDDDD", "#ECECEC"
+
+_WIDTH_IN = 9.6
+
+_SETTINGS: dict[Any, Any] = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "gonio",
+    "font.family": "DejaVu Sans",
+    "font.size": 10.0,
+    "axes.titlesize": 10.5,
+    "axes.titley": 1.0,  # a place of its own: nothing needs to be measured to find one
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "axes.labelsize": 10.5,
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.formatter.useoffset": False,
+    "axes.unicode_minus": True,
+    "text.parse_math": False,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "lines.linewidth": 1.5,
+    "lines.markersize": 4.5,
+}
+
+
+def style_of(incidence: int) -> tuple[str, str, Dashes]:
+    """Colour, marker and line style of an incidence, by its number."""
+    return (
+        _COLOURS[incidence % len(_COLOURS)],
+        _MARKERS[incidence % len(_MARKERS)],
+        _DASHES[incidence % len(_DASHES)],
+    )
+
+
+def svg_of(height_in: float, draw: Callable[[Figure], None], name: str) -> str:
+    """A figure as an SVG element whose ids begin with `name`: the same data, the same text.
+
+    Matplotlib's settings are changed for the drawing only.
+    """
+    import matplotlib as mpl
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(_SETTINGS):
+        figure = Figure(figsize=(_WIDTH_IN, height_in))
+        FigureCanvasSVG(figure)
+        draw(figure)
+        text = io.StringIO()
+        nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+        figure.savefig(text, format="svg", transparent=True, metadata=nothing)
+    return _embedded(text.getvalue(), name)
+
+
+def _embedded(svg: str, name: str) -> str:
+    """The SVG without what a page has no use for, as wide as the page, its ids its own."""
+    svg = svg[svg.index("<svg") :].replace("xlink:href=", "href=")
+    head, end, body = svg.partition(">")
+    head = re.sub(r' (width|height|xmlns:xlink)="[^"]*"', "", head)
+    return head + end + re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", body)
+
+
+def format_value(value: float, u: float | None, unit: str = "") -> str:
+    """A value rounded to the two significant digits of its uncertainty: `20.013 ± 0.021 °`.
+
+    Without a usable uncertainty the value stands alone, with four significant digits.
+    """
+    after = f"\u00a0{unit}" if unit else ""
+    if not math.isfinite(value):
+        return "—"
+    if u is None or not math.isfinite(u) or u <= 0:
+        return f"{value:.4g}{after}"
+    first = int(f"{u:.1e}".partition("e")[2])
+    largest = int(f"{max(abs(value), u):e}".partition("e")[2])
+    if first < -6 or largest > 6:
+        scaled = format_value(value / 10.0**largest, u / 10.0**largest)
+        return f"({scaled})\u00a0×\u00a010{_raised(largest)}{after}"
+    digits = 1 - first
+    decimals = max(digits, 0)
+    return f"{round(value, digits):.{decimals}f} ± {round(u, digits):.{decimals}f}{after}"
+
+
+def _raised(power: int) -> str:
+    return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+CSS = """
+:root { --ink: #1d1d1f; --soft: #5c5f66; --rule: #d4d6da; --wash: #f5f6f7; }
+* { box-sizing: border-box; }
+body { margin: 0 auto; max-width: 1000px; padding: 28px 24px 48px; color: var(--ink);
+  background: #fff; font: 16px/1.45 system-ui, "Segoe UI", "Helvetica Neue", Arial, "DejaVu Sans",
+  sans-serif; }
+h1 { font-size: 28px; line-height: 1.2; margin: 0 0 4px; }
+h2 { font-size: 20px; margin: 36px 0 8px; padding-top: 10px; border-top: 1px solid var(--rule); }
+h3 { font-size: 16px; margin: 18px 0 6px; }
+p { margin: 6px 0; }
+.sample { font-size: 18px; margin: 0; }
+.text, .soft { color: var(--soft); }
+.text { white-space: pre-line; }
+.verdict { margin: 18px 0; padding: 14px 20px 16px; border: 2px solid #6b7280;
+  border-left-width: 12px; background: var(--wash); border-radius: 4px; }
+.verdict.adequate { border-color: #00734f; background: #eef8f4; }
+.verdict.warning { border-color: #c05a00; background: #fdf4ea; }
+.verdict .state { font-size: 13px; font-weight: 700; letter-spacing: .06em;
+  text-transform: uppercase; }
+.verdict .headline { font-size: 21px; font-weight: 600; line-height: 1.3; margin: 2px 0 6px; }
+.values { display: flex; flex-wrap: wrap; gap: 10px 36px; margin: 12px 0 4px; }
+.values div { line-height: 1.25; }
+.values dt { color: var(--soft); font-size: 14px; }
+.values dd { margin: 0; font-size: 20px; font-weight: 600; font-variant-numeric: tabular-nums; }
+dl.values { margin-bottom: 0; }
+.attention { margin: 12px 0; padding: 8px 16px; border-left: 4px solid #c05a00; }
+.attention ul { margin: 0; padding-left: 20px; }
+figure { margin: 10px 0 18px; }
+figure > svg { display: block; width: 100%; height: auto; }
+figure > svg text { font-family: system-ui, "Segoe UI", "Helvetica Neue", Arial, "DejaVu Sans",
+  sans-serif !important; }
+figcaption { color: var(--soft); font-size: 14px; margin-top: 4px; }
+figcaption b { color: var(--ink); }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; width: 100%; font-size: 15px; }
+th, td { text-align: left; vertical-align: top; padding: 6px 14px 6px 8px;
+  border-bottom: 1px solid var(--rule); }
+th { font-size: 13px; color: var(--soft); font-weight: 600; border-bottom: 2px solid var(--soft); }
+td.number, th.number { text-align: right; white-space: nowrap;
+  font-variant-numeric: tabular-nums; }
+tr.chosen td { background: #eef8f4; border-top: 2px solid #00734f;
+  border-bottom: 2px solid #00734f; }
+tr.chosen td:first-child { font-weight: 700; border-left: 8px solid #00734f; }
+.parameter { display: block; white-space: nowrap; font-variant-numeric: tabular-nums; }
+.name { color: var(--soft); }
+.tag { display: inline-block; font-size: 12px; font-weight: 700; color: #00734f; }
+td svg.share { display: block; width: 220px; height: 14px; }
+.pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(270px, 1fr));
+  gap: 16px; }
+.pictures figure { margin: 0; break-inside: avoid; }
+.pictures svg { border: 1px solid var(--rule); background: #000; }
+.pictures image { image-rendering: pixelated; }
+.facts { display: grid; grid-template-columns: 1fr 1fr; gap: 0 40px; }
+.facts table { font-size: 14px; }
+body { overflow-wrap: break-word; }
+.facts td { overflow-wrap: anywhere; }
+.facts td:first-child { color: var(--soft); width: 40%; }
+@media (max-width: 700px) { .facts { grid-template-columns: 1fr; } }
+@media print {
+  @page { margin: 14mm; }
+  body { max-width: none; padding: 0; font-size: 11pt; }
+  h2 { break-after: avoid; }
+  .verdict, figure, tr, .attention { break-inside: avoid; }
+  .verdict, .verdict.adequate, .verdict.warning, tr.chosen td { background: #fff;
+    border-color: #000; }
+  .wide { overflow: visible; }
+  .tag { color: #000; }
+  .pictures { grid-template-columns: repeat(3, 1fr); }
+  figcaption, .soft, .text { color: #333; }
+}
+"""
