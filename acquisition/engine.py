@@ -169,6 +169,7 @@ def _reading(exposed: Exposed, window: Window, signal: Signal) -> Reading:
         signal_dn=signal.signal_dn,
         u_noise_dn=signal.u_noise_dn,
         u_quantisation_dn=signal.u_quantisation_dn,
+        u_dark_dn=signal.u_dark_dn,
         u_placement_dn=signal.u_placement_dn,
         exposure_s=first.exposure_s,
         frames=len(exposed.frames),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.reduction import Reduced
+from acquisition.reduction import Reduced, root_sum_square
 from analysis.acceptance import Acceptance
 from analysis.choice import LADDER, Choice, choose
 from analysis.fit import FitResult, fit
@@ -41,8 +41,7 @@ class Fitted:
 
     def u_brdf(self, reduced: Reduced) -> FloatArray:
         """Standard uncertainty of every BRDF (N,), 1/sr: with the angles' share where fitted."""
-        relative2 = reduced.u_random**2 + reduced.u_placement**2 + reduced.u_reference**2
-        u: FloatArray = np.abs(reduced.brdf) * np.sqrt(relative2 + reduced.u_tile**2)
+        u = np.abs(reduced.brdf) * root_sum_square(list(reduced.parts.values()))
         if self.chosen is not None:
             u[self.used] = self.chosen.u_total
         return u
@@ -62,32 +61,29 @@ def fit_run(reduced: Reduced, loaded: Loaded) -> Fitted:
 
 
 def u_without(
-    component: str, reduced: Reduced, chosen: FitResult, loaded: Loaded
+    names: Sequence[str], reduced: Reduced, chosen: FitResult, loaded: Loaded
 ) -> Mapping[str, float | None]:
-    """Uncertainties of the chosen model's parameters if one component of u were not there."""
-    finer = measurements(reduced, loaded, without=(component,))
+    """Uncertainties of the chosen model's parameters if some parts of u were not there."""
+    finer = measurements(reduced, loaded, without=names)
     acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
     return fit(MODELS[chosen.model], finer, acceptance=acceptance).u
 
 
 def measurements(reduced: Reduced, loaded: Loaded, without: Sequence[str] = ()) -> Measurements:
-    """The sound points as the fit sees them, `without` some components of their uncertainty."""
+    """The sound points as the fit sees them, `without` some parts of their uncertainty."""
     keep = reduced.sound
     points = [p for p, kept in zip(reduced.points, keep, strict=True) if kept]
-    parts = [u[keep] ** 2 for name, u in reduced.components.items() if name not in without]
+    own = [u[keep] for name, u in reduced.components.items() if name not in without]
+    shared = (*reduced.shared, *reduced.shared_by_tile)
     axes, brdf = loaded.rig.axes, reduced.brdf[keep]
     return Measurements(
         np.array([p.theta_i_deg for p in points]),
         np.array([p.theta_r_deg for p in points]),
         np.array([p.dphi_deg for p in points]),
         brdf,
-        np.sqrt(np.sum(parts, axis=0)) * brdf,
+        root_sum_square(own) * brdf,
         lamp_setting=np.array([p.lamp_setting for p in points], dtype=np.int64),
-        reference=reduced.reference[keep],
-        u_reference=reduced.u_reference[keep],
-        u_tile=reduced.u_tile,
-        placement=np.array([p.block for p in points], dtype=np.int64),
-        u_placement=reduced.u_placement[keep],
+        shared=tuple(e.of(keep) for e in shared if e.name not in without),
         u_theta_i_deg=axes.theta_i.u_deg,
         u_theta_r_deg=axes.theta_r.u_deg,
         u_dphi_deg=axes.dphi.u_deg,

@@ -36,6 +36,7 @@ class Signal:
     signal_dn: float
     u_noise_dn: float
     u_quantisation_dn: float
+    u_dark_dn: float
     u_placement_dn: float
     saturated_pixels: int
     peak_dn: float
@@ -72,7 +73,8 @@ def measure(
     return Signal(
         window.mean(mean - dark.mean[window.crop]),
         _noise(window, variance / len(frames) + dark.variance[window.crop] / dark.frames),
-        _quantisation(window, variance, dark),
+        _rounding(window, mean, camera),
+        _rounding(window, dark.mean[window.crop], camera),
         u_placement_mm * window.columns_per_mm * slope,
         saturated,
         peak,
@@ -93,11 +95,9 @@ def _mean_and_variance(images: Sequence[Image], camera: Camera) -> tuple[FloatAr
         total += counts
         squares += np.square(counts, out=counts)
     mean = total / count
-    if count > 1:
-        return mean, (squares - total * mean) / (count - 1)
-    gain = camera.electrons_per_dn
-    electrons = np.maximum(mean - camera.black_level_dn, 0.0) * gain
-    return mean, (electrons + camera.read_noise_electrons**2) / gain**2
+    if count == 1:
+        return mean, _photon_transfer(mean, camera)
+    return mean, (squares - total * mean) / (count - 1)
 
 
 def _noise(window: Window, variance: FloatArray) -> float:
@@ -105,11 +105,20 @@ def _noise(window: Window, variance: FloatArray) -> float:
     return float(np.sqrt(np.sum(window.weights**2 * variance)))
 
 
-def _quantisation(window: Window, variance: FloatArray, dark: Dark) -> float:
-    """Standard uncertainty that rounding to whole counts leaves, in frames and dark together."""
-    lit = rounding_u_dn(window.mean(variance))
-    unlit = rounding_u_dn(window.mean(dark.variance[window.crop]))
-    return float(np.hypot(lit, unlit))
+def _rounding(window: Window, mean: FloatArray, camera: Camera) -> float:
+    """Standard uncertainty that rounding to whole counts leaves in the window's mean, DN.
+
+    The noise that dithers it is the rig file's: that of the counts contains the rounding itself.
+    """
+    return rounding_u_dn(window.mean(_photon_transfer(mean, camera)))
+
+
+def _photon_transfer(mean: FloatArray, camera: Camera) -> FloatArray:
+    """Variance of a pixel before rounding, DN^2: photons and read noise of the rig file."""
+    gain = camera.electrons_per_dn
+    electrons = np.maximum(mean - camera.black_level_dn, 0.0) * gain
+    variance: FloatArray = (electrons + camera.read_noise_electrons**2) / gain**2
+    return variance
 
 
 def rounding_u_dn(noise_variance_dn2: float) -> float:

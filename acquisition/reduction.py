@@ -13,46 +13,46 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.drift import Drift, rate
+from analysis.measurements import SharedError
 from instrument.geometry import FloatArray
 from instrument.protocol_config import Protocol
 from instrument.record import Reading
 
 NOISE, ROUNDING, DRIFT = "photon and read noise", "rounding to counts", "lamp drift"
+DARK, PLACEMENT = "rounding of the dark", "sample placement"
+TILE_READING, TILE = "white tile reading", "white tile certificate"
 
 
 @dataclass(frozen=True, slots=True)
 class Reduced:
     """All points of a run, arrays of shape (N,). brdf in 1/sr, nan where no reference was taken.
 
-    `components`: relative standard uncertainties of single points, by name; independent from point
-    to point. `u_reference`: relative, of the tile's reading, common to all points divided by it
-    (`reference` numbers them, -1 for none). `u_tile`: relative, of its certificate, common to all.
-    `u_placement`: relative and signed, of how the sample stands on the axis: common to a block,
-    as it is placed once. `drift`: time in s and lamp level of each check.
+    `components`: relative standard uncertainties by name, independent from point to point.
+    `shared`: those of the radiance that points share; `shared_by_tile`: those that the comparison
+    with the tile adds. `drift`: time in s and lamp level of each check.
     """
 
     points: tuple[Reading, ...]
     radiance: FloatArray
     brdf: FloatArray
     components: Mapping[str, FloatArray]
-    reference: NDArray[np.int64]
-    u_reference: FloatArray
-    u_tile: float
-    u_placement: FloatArray
+    shared: tuple[SharedError, ...]
+    shared_by_tile: tuple[SharedError, ...]
     flags: tuple[str, ...]
     drift: tuple[tuple[float, float], ...]
 
     @property
-    def u_random(self) -> FloatArray:
-        """Relative standard uncertainty that points do not share."""
-        total: FloatArray = np.sqrt(np.sum([c**2 for c in self.components.values()], axis=0))
-        return total
+    def parts(self) -> dict[str, FloatArray]:
+        """Every relative standard uncertainty of the BRDF by name, shared or not, 0 or more."""
+        shared = {e.name: np.abs(e.u_relative) for e in (*self.shared, *self.shared_by_tile)}
+        return {**self.components, **shared}
 
     @property
     def u_radiance(self) -> FloatArray:
         """Standard uncertainty of the radiance, in its unit."""
-        u: FloatArray = np.abs(self.radiance) * np.hypot(self.u_random, self.u_placement)
-        return u
+        own = [*self.components.values(), *(e.u_relative for e in self.shared)]
+        return np.abs(self.radiance) * root_sum_square(own)
 
     @property
     def sound(self) -> NDArray[np.bool_]:
@@ -62,117 +62,94 @@ class Reduced:
 
 
 @dataclass(frozen=True, slots=True)
-class _Drift:
-    """The lamp of one block relative to its first check."""
-
-    times_s: FloatArray
-    level: FloatArray
-    u_level: float
-
-    @property
-    def _slope_per_s(self) -> float:
-        """Mean change over all checks."""
-        if self.times_s.size < 2:
-            return 0.0
-        return float((self.level[-1] - self.level[0]) / (self.times_s[-1] - self.times_s[0]))
-
-    def _outside_s(self, time_s: float) -> float:
-        """Seconds from the nearest check, negative before the first, 0 between them."""
-        if not self.times_s.size:
-            return 0.0
-        return float(time_s - np.clip(time_s, self.times_s[0], self.times_s[-1]))
-
-    def at(self, time_s: float) -> float:
-        """Level by straight lines between the checks, and by the mean slope beyond them."""
-        if not self.times_s.size:
-            return 1.0
-        inside = float(np.interp(time_s, self.times_s, self.level))
-        return inside + self._slope_per_s * self._outside_s(time_s)
-
-    def u_beyond(self, time_s: float) -> float:
-        """Standard uncertainty of the level beyond the checks: half of what was extrapolated."""
-        return abs(self._slope_per_s * self._outside_s(time_s)) / 2
-
-
-@dataclass(frozen=True, slots=True)
 class _Tile:
-    number: int
+    """The white tile's reading for one place of the lamp."""
+
     rate: float
     u_relative: float
     flags: str
 
 
+def root_sum_square(parts: Sequence[FloatArray]) -> FloatArray:
+    """Independent uncertainties (N,) taken together."""
+    total: FloatArray = np.sqrt(np.sum(np.square(parts), axis=0))
+    return total
+
+
 def reduce(readings: Sequence[Reading], protocol: Protocol) -> Reduced:
     """Work out radiance and BRDF of all points of a run."""
     points = tuple(r for r in readings if r.kind == "point")
-    drifts = {block: _drift(readings, block) for block in {r.block for r in readings}}
-    tiles = _tiles(readings, drifts)
+    drifts = {block: Drift.of(readings, block) for block in sorted({r.block for r in readings})}
+    tiles = {r.lamp_setting: _tile(r, drifts[r.block]) for r in readings if r.kind == "tile"}
+    radiance = np.array([rate(p) / drifts[p.block].at(p.time_s) for p in points])
     tile = protocol.references.white_tile
-    rate = np.array([_rate(p) / drifts[p.block].at(p.time_s) for p in points])
-    own = [tiles.get(p.lamp_setting) for p in points]
     known = tile.reflectance / np.pi if tile is not None else np.nan
-    white = np.array([np.nan if t is None else t.rate for t in own])
+    white = np.array([tiles[p.lamp_setting].rate if tiles else np.nan for p in points])
     return Reduced(
         points,
-        rate,
-        rate / white * known,
+        radiance,
+        radiance / white * known,
         _components(points, drifts),
-        np.array([-1 if t is None else t.number for t in own]),
-        np.array([0.0 if t is None else t.u_relative for t in own]),
-        0.0 if tile is None else tile.u_reflectance / tile.reflectance,
-        np.array([p.u_placement_dn / p.signal_dn if p.signal_dn else np.nan for p in points]),
-        tuple(_flags(p, t) for p, t in zip(points, own, strict=True)),
+        _shared(points),
+        _shared_by_tile(points, tiles, protocol) if tiles else (),
+        tuple(_flags(p, tiles.get(p.lamp_setting)) for p in points),
         tuple(
             (float(time_s), float(level))
-            for _, drift in sorted(drifts.items())
+            for drift in drifts.values()
             for time_s, level in zip(drift.times_s, drift.level, strict=True)
         ),
     )
 
 
-def _rate(reading: Reading) -> float:
-    return reading.signal_dn / reading.exposure_s
+def _relative(points: Sequence[Reading], name: str) -> FloatArray:
+    """One of the readings' uncertainties relative to the signal; nan where that is nought."""
+    signal = np.array([p.signal_dn or np.nan for p in points])
+    relative: FloatArray = np.array([getattr(p, name) for p in points]) / signal
+    return relative
 
 
-def _u_counts(reading: Reading) -> float:
-    """Relative standard uncertainty of a reading's counts."""
-    u_dn = np.linalg.norm([reading.u_noise_dn, reading.u_quantisation_dn, reading.u_placement_dn])
-    return float(u_dn / abs(reading.signal_dn)) if reading.signal_dn else float("nan")
+def _tile(reading: Reading, drift: Drift) -> _Tile:
+    names = ("u_noise_dn", "u_quantisation_dn", "u_dark_dn", "u_placement_dn")
+    counts = [_relative([reading], name)[0] for name in names]
+    return _Tile(
+        rate(reading) / drift.at(reading.time_s),
+        float(np.linalg.norm([*counts, drift.u_beyond(reading.time_s)])),
+        reading.flags,
+    )
 
 
-def _drift(readings: Sequence[Reading], block: int) -> _Drift:
-    checks = [r for r in readings if r.kind == "drift" and r.block == block and not r.flags]
-    rates = np.array([_rate(r) for r in checks])
-    times = np.array([r.time_s for r in checks])
-    level = rates / rates[0] if rates.size else rates
-    # The same geometry again: placement and rounding are the same each time, noise is not.
-    noise = [r.u_noise_dn / r.signal_dn for r in checks]
-    # A level is the ratio of two checks.
-    u_level = float(np.sqrt(2.0) * np.median(noise)) if noise else 0.0
-    return _Drift(times, level, u_level)
-
-
-def _tiles(readings: Sequence[Reading], drifts: Mapping[int, _Drift]) -> dict[int, _Tile]:
-    """The white tile's reading for every place of the lamp."""
-    tiles = [r for r in readings if r.kind == "tile"]
+def _components(points: Sequence[Reading], drifts: Mapping[int, Drift]) -> dict[str, FloatArray]:
     return {
-        r.lamp_setting: _Tile(
-            number,
-            _rate(r) / drifts[r.block].at(r.time_s),
-            float(np.hypot(_u_counts(r), drifts[r.block].u_beyond(r.time_s))),
-            r.flags,
-        )
-        for number, r in enumerate(tiles)
-    }
-
-
-def _components(points: Sequence[Reading], drifts: Mapping[int, _Drift]) -> dict[str, FloatArray]:
-    signal = np.array([abs(p.signal_dn) for p in points])
-    return {
-        NOISE: np.array([p.u_noise_dn for p in points]) / signal,
-        ROUNDING: np.array([p.u_quantisation_dn for p in points]) / signal,
+        NOISE: np.abs(_relative(points, "u_noise_dn")),
+        ROUNDING: np.abs(_relative(points, "u_quantisation_dn")),
         DRIFT: np.array([drifts[p.block].u_level for p in points]),
     }
+
+
+def _shared(points: Sequence[Reading]) -> tuple[SharedError, ...]:
+    """One dark serves an exposure, and the sample is placed once a block."""
+    exposures = np.unique([p.exposure_s for p in points], return_inverse=True)[1]
+    blocks = np.array([p.block for p in points], dtype=np.int64)
+    return (
+        SharedError(DARK, _relative(points, "u_dark_dn"), exposures.astype(np.int64)),
+        SharedError(PLACEMENT, _relative(points, "u_placement_dn"), blocks),
+    )
+
+
+def _shared_by_tile(
+    points: Sequence[Reading], tiles: Mapping[int, _Tile], protocol: Protocol
+) -> tuple[SharedError, ...]:
+    """The tile is read once for every place of the lamp; its certificate holds for all."""
+    tile = protocol.references.white_tile
+    if tile is None:
+        return ()
+    settings = np.array([p.lamp_setting for p in points], dtype=np.int64)
+    u_reading = np.array([tiles[p.lamp_setting].u_relative for p in points])
+    u_certificate = tile.u_reflectance / tile.reflectance
+    return (
+        SharedError(TILE_READING, u_reading, settings),
+        SharedError.of_all(TILE, u_certificate, len(points)),
+    )
 
 
 def _flags(point: Reading, tile: _Tile | None) -> str:

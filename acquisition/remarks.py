@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from acquisition.fitting import Fitted, u_without
-from acquisition.reduction import ROUNDING, Reduced
+from acquisition.reduction import DARK, NOISE, ROUNDING, Reduced
 from analysis.fit import FitResult
 from analysis.models import MODELS
 from analysis.report_data import Parameter
@@ -57,15 +57,12 @@ def parameters_of(result: FitResult) -> tuple[Parameter, ...]:
 
 def budget(reduced: Reduced, u_brdf: FloatArray) -> Budget:
     """Rows of (component, median relative u in %, share of the variance in %), largest first."""
+    parts = {name: u**2 for name, u in reduced.parts.items()}
     known = np.isfinite(reduced.brdf)
-    parts = {name: u**2 for name, u in reduced.components.items()}
-    parts["sample placement"] = reduced.u_placement**2
     if known.any():
-        parts["white tile's reading"] = reduced.u_reference**2
-        parts["white tile's certificate"] = np.full(known.shape, reduced.u_tile**2)
         total = (u_brdf / reduced.brdf) ** 2
-        rest = total - np.sum(list(parts.values()), axis=0)
-        parts["angle setting"] = np.maximum(rest, 0.0)  # what the fit's total has beyond them
+        # What the fit's total has beyond all other parts.
+        parts["angle setting"] = np.maximum(total - np.sum(list(parts.values()), axis=0), 0.0)
         parts = {name: part[known] for name, part in parts.items()}
     whole = sum(float(np.mean(p)) for p in parts.values())
     rows = [
@@ -77,7 +74,7 @@ def budget(reduced: Reduced, u_brdf: FloatArray) -> Budget:
 
 def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> tuple[str, ...]:
     """What else the operator should know."""
-    tile = "the white tile is taken as Lambertian" if reduced.u_tile else ""
+    tile = "the white tile is taken as Lambertian" if reduced.shared_by_tile else ""
     found = (
         fitted.reason if fitted.choice is not None else "",
         _hidden_note(record),
@@ -124,14 +121,15 @@ def _bits_note(reduced: Reduced, fitted: Fitted, loaded: Loaded) -> str:
     bits = loaded.rig.camera.bit_depth
     if bits > FEW_BITS or fitted.chosen is None:
         return ""
-    rounding = reduced.components[ROUNDING][fitted.used]
-    share = float(np.median(rounding**2 / reduced.u_random[fitted.used] ** 2))
+    used = fitted.used
+    rounding = np.hypot(reduced.parts[ROUNDING], reduced.parts[DARK])[used]
+    own = reduced.parts[NOISE][used]
     text = (
-        f"what {bits} bits cost: rounding to whole counts gives every point a relative u of "
-        f"{100 * np.median(rounding):.2g} % (median; worst {100 * rounding.max():.2g} %), "
-        f"{100 * share:.0f} % of the variance that points do not share"
+        f"what {bits} bits cost: rounding frames and darks to whole counts gives every point a "
+        f"relative u of {100 * np.median(rounding):.2g} % (median; worst "
+        f"{100 * rounding.max():.2g} %), {np.median(rounding / own):.1f} times its noise"
     )
-    better = u_without(ROUNDING, reduced, fitted.chosen, loaded)
+    better = u_without((ROUNDING, DARK), reduced, fitted.chosen, loaded)
     gains = [
         f"u({name}) would be {u:.2g} instead of {now:.2g}"
         for name, u in better.items()

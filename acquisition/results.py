@@ -68,14 +68,14 @@ def table(reduced: Reduced, u_brdf: FloatArray) -> str:
     """measurements.csv: one row a point; behind the promised columns, each part of its u."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    parts = [f"u_{name.replace(' ', '_')}_relative" for name in reduced.components]
+    parts = [f"u_{name.replace(' ', '_')}_relative" for name in reduced.parts]
     writer.writerow([*COLUMNS, *parts])
     for n, p in enumerate(reduced.points):
         values = (reduced.radiance[n], reduced.u_radiance[n], reduced.brdf[n], u_brdf[n])
         writer.writerow(
             [p.theta_i_deg, p.theta_r_deg, p.dphi_deg, *map(_cell, values)]
             + [f"{p.window_pixels:.2f}", p.exposure_s, p.frames, reduced.flags[n], p.time_utc]
-            + [_cell(float(u[n])) for u in reduced.components.values()]
+            + [_cell(float(u[n])) for u in reduced.parts.values()]
         )
     return text.getvalue()
 

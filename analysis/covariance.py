@@ -58,7 +58,7 @@ class Covariance:
 
         The mean of the errors' normal distribution given the residual: common^T C^-1 residual.
         """
-        return np.asarray(self.common.T @ self.whiten(self.whiten(residual)))
+        return np.asarray(self.whiten(self.common).T @ self.whiten(residual))
 
     @property
     def u_total(self) -> FloatArray:
@@ -105,11 +105,8 @@ def shared(
     groups = [
         ("theta_i, lamp setting", _change(m, own, theta_i=m.u_theta_i_deg), m.lamp_setting),
         ("dphi, lamp setting", _change(m, own, dphi=m.u_dphi_deg), m.lamp_setting),
-        ("white tile, reading", f * m.u_reference, m.reference),
-        ("white tile, certificate", f * m.u_tile, np.zeros(m.size, dtype=np.int64)),
+        *((error.name, f * error.u_relative, error.group) for error in m.shared),
     ]
-    if m.placement is not None and m.u_placement is not None:
-        groups.append(("sample, placement", f * m.u_placement, m.placement))
     variance = np.square(m.u_random) + np.square(_change(m, smooth, theta_r=m.u_theta_r_deg))
     columns, names = [], []
     for name, shift, group in groups:

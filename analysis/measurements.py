@@ -17,10 +17,29 @@ from instrument.geometry import FloatArray, Geometry
 
 IntArray = NDArray[np.int64]
 
-_ARRAYS = (
-    *("theta_i_deg", "theta_r_deg", "dphi_deg", "brdf", "u_random"),
-    *("lamp_setting", "reference", "u_reference", "placement", "u_placement"),
-)
+_ARRAYS = ("theta_i_deg", "theta_r_deg", "dphi_deg", "brdf", "u_random", "lamp_setting")
+
+
+@dataclass(frozen=True, slots=True)
+class SharedError:
+    """An error that points share: all points of one number in `group` (N,) have the same one.
+
+    u_relative: (N,), what one standard deviation of it changes each point by, relative to its
+    value and signed; 0 for points that do not have it.
+    """
+
+    name: str
+    u_relative: FloatArray
+    group: IntArray
+
+    def of(self, points: NDArray[np.bool_]) -> SharedError:
+        """The same error of some of the points (N,)."""
+        return SharedError(self.name, self.u_relative[points], self.group[points])
+
+    @classmethod
+    def of_all(cls, name: str, u_relative: float, size: int) -> SharedError:
+        """An error that all of `size` points share alike."""
+        return cls(name, np.full(size, u_relative), np.zeros(size, dtype=np.int64))
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,17 +51,12 @@ class Measurements:
     u_random: in 1/sr, noise, quantisation and drift, independent from point to point; None: not
         stated, then every other uncertainty must be 0.
     lamp_setting: points of one number share one setting of theta_i and dphi, and its errors.
-    reference: which measurement of the white tile a point was divided by.
-    u_reference: relative, noise of that measurement of the tile: common to its points.
-    u_tile: relative, the tile's calibration: common to all points.
-    placement: points of one number were taken with the sample placed once on its axis.
-    u_placement: relative, and signed as the change that one standard deviation of the placement
-        makes: common to the points of a placement. Both None: no such error.
+    shared: further errors that points share, as those of a white tile or of the dark.
     u_theta_i_deg, u_theta_r_deg, u_dphi_deg: of the angles, in degrees; that of theta_r is
         independent from point to point.
 
     Raises `ValueError` for shapes that differ, values that are not finite, angles outside their
-    domain, a `u_random` that is not positive, or any other negative uncertainty.
+    domain, a `u_random` that is not positive, or a negative uncertainty of an angle.
     """
 
     theta_i_deg: FloatArray
@@ -51,31 +65,29 @@ class Measurements:
     brdf: FloatArray
     u_random: FloatArray | None
     lamp_setting: IntArray
-    reference: IntArray
-    u_reference: FloatArray
-    u_tile: float = 0.0
+    shared: tuple[SharedError, ...] = ()
     u_theta_i_deg: float = 0.0
     u_theta_r_deg: float = 0.0
     u_dphi_deg: float = 0.0
-    placement: IntArray | None = None
-    u_placement: FloatArray | None = None
 
     def __post_init__(self) -> None:
         self._check_arrays()
-        for name in ("u_tile", "u_theta_i_deg", "u_theta_r_deg", "u_dphi_deg"):
+        for name in ("u_theta_i_deg", "u_theta_r_deg", "u_dphi_deg"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} = {value:g}; allowed: finite, 0 or more")
             if value > 0 and self.u_random is None:
                 raise ValueError(f"{name} = {value:g} is stated, so u_random must be stated too")
-        if (self.placement is None) != (self.u_placement is None):
-            raise ValueError("placement and u_placement are given both or not at all")
         _ = self.geometry  # its own checks: angles within their domain
 
     def _check_arrays(self) -> None:
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        for error in self.shared:
+            arrays |= {error.name: error.u_relative, f"group of {error.name}": error.group}
+            if self.u_random is None and np.any(error.u_relative != 0):
+                raise ValueError(f"{error.name} is stated, so u_random must be stated too")
         shape = (np.size(self.brdf),)
-        for name in _ARRAYS:
-            array = getattr(self, name)
+        for name, array in arrays.items():
             if array is None:
                 continue
             if np.shape(array) != shape:
@@ -84,11 +96,6 @@ class Measurements:
                 raise ValueError(f"{name} holds a value that is not finite")
         if self.u_random is not None and np.any(self.u_random <= 0):
             raise ValueError(f"u_random = {self.u_random.min():g} 1/sr; allowed: more than 0 1/sr")
-        if np.any(self.u_reference < 0):
-            raise ValueError(f"u_reference = {self.u_reference.min():g}; allowed: 0 or more")
-        for name, u in (("u_reference", self.u_reference), ("u_placement", self.u_placement)):
-            if self.u_random is None and u is not None and np.any(u != 0):
-                raise ValueError(f"{name} is stated, so u_random must be stated too")
 
     @classmethod
     def bare(
@@ -102,7 +109,7 @@ class Measurements:
         """Measurements of which only the angles, the BRDF and perhaps its u (1/sr) are known.
 
         Arguments broadcast to the shape (N,). Points with the same theta_i and dphi count as one
-        setting of the lamp, all points as divided by one reference; all shared errors are 0.
+        setting of the lamp; there are no shared errors.
         """
         parts = [theta_i_deg, theta_r_deg, dphi_deg, brdf, 0.0 if u_brdf is None else u_brdf]
         arrays = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in parts))
@@ -114,8 +121,6 @@ class Measurements:
             value,
             None if u_brdf is None else u,
             lamp_setting=same_setting(theta_i, dphi),
-            reference=np.zeros(value.size, dtype=np.int64),
-            u_reference=np.zeros(value.size),
         )
 
     @property

@@ -43,7 +43,8 @@ class Reading:
     `step` is its number in the plan. Angles in degrees, theta_r signed. `signal_dn` is the
     area-weighted mean of the window over all frames less the dark, cos^4 divided out; the u are
     standard uncertainties of it: `u_noise_dn` of photons and read-out, `u_quantisation_dn` of
-    rounding to whole counts, `u_placement_dn` of how well the sample stands on the axis (signed:
+    rounding the frames to whole counts, `u_dark_dn` of rounding the dark (the same for all
+    readings of one exposure), `u_placement_dn` of how well the sample stands on the axis (signed:
     one placement shifts all its readings together).
     `lamp_setting` numbers the places of the lamp, `block` the times it was set by hand.
     """
@@ -59,6 +60,7 @@ class Reading:
     signal_dn: float
     u_noise_dn: float
     u_quantisation_dn: float
+    u_dark_dn: float
     u_placement_dn: float
     exposure_s: float
     frames: int

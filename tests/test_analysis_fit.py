@@ -12,11 +12,15 @@ from test_analysis_scan import GLOSSY, RIG, scan
 from analysis.covariance import Covariance, independent, shared
 from analysis.fit import fit
 from analysis.interval import interval
-from analysis.measurements import Measurements
+from analysis.measurements import Measurements, SharedError
 from analysis.models import MODELS
 from analysis.problem import Problem
 from instrument.errors import NotDetermined
 from instrument.geometry import FloatArray, Geometry
+
+
+def tile_of(m: Measurements, u_relative: float) -> SharedError:
+    return SharedError.of_all("white tile", u_relative, m.size)
 
 
 def test_whitening_gives_the_chi2_of_the_full_matrix() -> None:
@@ -31,9 +35,33 @@ def test_whitening_gives_the_chi2_of_the_full_matrix() -> None:
     np.testing.assert_allclose(C.u_total**2, np.diag(C.matrix()), rtol=1e-12)
 
 
+def test_the_pulls_are_the_likeliest_shared_errors() -> None:
+    """Against the normal equations of points and shared errors taken together."""
+    rng = np.random.default_rng(5)
+    C = Covariance(rng.uniform(0.5, 2, 20), rng.normal(size=(20, 4)))
+    r = rng.normal(size=20)
+    weighted = C.common.T / C.variance
+    expected = np.linalg.solve(weighted @ C.common + np.eye(4), weighted @ r)
+    assert C.pulls(r) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_tile_reading_that_is_off_is_named_and_leaves_no_pattern() -> None:
+    m = scan("oren_nayar", 1, albedo=0.8, sigma_deg=30)
+    reading = SharedError("reading", np.full(m.size, 0.002), m.lamp_setting)
+    m = replace(m, shared=(*m.shared, reading))
+    off = np.where(reading.group == 1, 1.01, 1.0)  # five times the u of one tile reading
+    found = fit(MODELS["oren_nayar"], replace(m, brdf=m.brdf * off))
+    pulls = {n: p for n, p in found.pulls.items() if n.startswith("reading")}
+    assert max(pulls, key=lambda name: pulls[name]) == "reading 2"
+    assert pulls["reading 2"] > 2
+    assert found.residuals.std() == pytest.approx(1.0, abs=0.3)
+    assert abs(found.residuals.mean()) < 0.3
+
+
 def test_shared_errors_are_where_they_belong() -> None:
     m = scan("oren_nayar", 1, albedo=0.8, sigma_deg=30)
-    m = replace(m, u_reference=np.full(m.size, 0.002), reference=m.lamp_setting)
+    reading = SharedError("reading", np.full(m.size, 0.002), m.lamp_setting)
+    m = replace(m, shared=(*m.shared, reading))
 
     def smooth(geometry: Geometry) -> FloatArray:
         return MODELS["oren_nayar"].brdf(geometry, albedo=0.8, sigma_deg=30)
@@ -51,18 +79,14 @@ def test_shared_errors_are_where_they_belong() -> None:
     assert C[a, b] == pytest.approx(shared_ab, rel=1e-4)
 
 
-def test_the_placement_s_error_is_signed_and_shared() -> None:
-    m = replace(
-        Measurements.bare(30.0, [0.0, 20.0, 40.0], 0.0, 0.2, 0.001),
-        placement=np.array([0, 0, 1]), u_placement=np.array([0.01, -0.02, 0.03]),
-    )  # fmt: skip
+def test_a_shared_error_may_raise_one_point_and_lower_another() -> None:
+    placement = SharedError("placement", np.array([0.01, -0.02, 0.03]), np.array([0, 0, 1]))
+    m = replace(Measurements.bare(30.0, [0.0, 20.0, 40.0], 0.0, 0.2, 0.001), shared=(placement,))
     C = shared(m, lambda g: np.full(g.shape, 0.2)).matrix()
     expected = np.diag([1e-6] * 3) + 0.04 * np.array(
         [[1e-4, -2e-4, 0], [-2e-4, 4e-4, 0], [0, 0, 9e-4]]
     )
     np.testing.assert_allclose(C, expected, atol=1e-15)
-    with pytest.raises(ValueError, match="both or not at all"):
-        replace(m, placement=None)
 
 
 def test_angle_errors_at_the_edges_of_the_domain() -> None:
@@ -97,7 +121,7 @@ def test_the_tile_s_error_goes_to_the_albedo_alone() -> None:
     model = MODELS["oren_nayar_qualitative"]
     m = scan(model.name, 5, u_tile=0.0, albedo=0.8, sigma_deg=30)
     assert m.u_random is not None
-    off = replace(m, brdf=m.brdf * 1.01, u_random=m.u_random * 1.01, u_tile=0.005)
+    off = replace(m, brdf=m.brdf * 1.01, u_random=m.u_random * 1.01, shared=(tile_of(m, 0.005),))
     exact, scaled = fit(model, m), fit(model, off)
     assert (exact.u["albedo"] or 1) < 0.0005
     assert scaled.u["albedo"] == pytest.approx(0.005 * 0.808, rel=0.02)
@@ -109,7 +133,8 @@ def test_the_tile_s_error_goes_to_the_albedo_alone() -> None:
 
 def test_no_pull_towards_low_points() -> None:
     # Peelle's puzzle: two values, 1.5 and 1.0, each 10 % and 20 % in common, do not average 0.88.
-    m = replace(Measurements.bare(30.0, [0.0, 20.0], 0.0, [0.15, 0.10], [0.015, 0.010]), u_tile=0.2)
+    m = Measurements.bare(30.0, [0.0, 20.0], 0.0, [0.15, 0.10], [0.015, 0.010])
+    m = replace(m, shared=(tile_of(m, 0.2),))
     found = fit(MODELS["lambert"], m)
     assert 0.10 < found.values["albedo"] / np.pi < 0.15
 
@@ -198,12 +223,13 @@ def test_too_few_points() -> None:
     ("change", "words"),
     [
         ({"u_random": np.zeros(2)}, "u_random = 0 1/sr"),
-        ({"u_random": None, "u_tile": 0.01}, "u_random must be stated"),
-        ({"u_tile": -1.0}, "u_tile = -1"),
+        ({"u_random": None, "u_dphi_deg": 0.01}, "u_random must be stated"),
+        ({"u_random": None, "shared": (SharedError.of_all("tile", 0.01, 2),)}, "tile is stated"),
+        ({"u_dphi_deg": -1.0}, "u_dphi_deg = -1"),
         ({"brdf": np.array([0.2, np.nan])}, "brdf holds a value that is not finite"),
         ({"theta_i_deg": np.array([30.0, 95.0])}, "theta_i = 95"),
-        ({"reference": np.zeros(3, dtype=np.int64)}, "reference has the shape"),
-        ({"u_reference": np.array([0.1, -0.1])}, "u_reference = -0.1"),
+        ({"shared": (SharedError.of_all("tile", 0.1, 3),)}, "tile has the shape"),
+        ({"shared": (SharedError.of_all("tile", np.nan, 2),)}, "tile holds a value"),
     ],
 )
 def test_wrong_measurements_are_named(change: dict[str, object], words: str) -> None:

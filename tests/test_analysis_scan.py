@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.acceptance import Acceptance, averaged_brdf
-from analysis.measurements import Measurements, same_setting
+from analysis.measurements import Measurements, SharedError, same_setting
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
 
@@ -52,8 +52,7 @@ def scan(
     noisy = value * (1 + u_tile * rng.normal()) * (1 + u_relative * rng.normal(size=value.size))
     return Measurements(
         theta_i, theta_r, dphi, noisy, u_relative * np.abs(value),
-        lamp_setting=setting, reference=np.zeros(value.size, dtype=np.int64),
-        u_reference=np.zeros(value.size), u_tile=u_tile,
+        lamp_setting=setting, shared=(SharedError.of_all("white tile", u_tile, value.size),),
         u_theta_i_deg=u_deg, u_theta_r_deg=u_deg, u_dphi_deg=u_deg,
     )  # fmt: skip
 

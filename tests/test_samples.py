@@ -122,6 +122,6 @@ def test_more_bits_leave_less_to_rounding(tmp_path: Path) -> None:
     for bits in (8, 12):
         camera = loaded.rig.camera.model_copy(update={"bit_depth": bits})
         reduced, _, _ = measured(changed(short, rig={"camera": camera}), tmp_path / str(bits))
-        rounding.append(float(reduced.components["rounding to counts"].max()))
-    assert rounding[0] > 1e-5
+        rounding.append(float(reduced.parts["rounding of the dark"].max()))
+    assert rounding[0] > 1e-4
     assert rounding[1] < rounding[0] / 16
