@@ -226,7 +226,7 @@ def _candidates(data: ReportData) -> str:
     known = [c.bic for c in data.candidates if c.bic is not None and math.isfinite(c.bic)]
     best = min(known, default=None)
     head = _row(
-        ("Model", "Parameters ± u (k = 1)", "#Residual, rms", "#Reduced χ²", "#ΔBIC", "Converged"),
+        ("Model", "Parameters ± u (k = 1)", "#Residual, rms", "#Reduced χ²", "#ΔBIC"),
         cell="th",
     )
     rows = "".join(_candidate(c, best) for c in data.ranked)
@@ -244,6 +244,8 @@ def _candidate(candidate: Candidate, best_bic: float | None) -> str:
     if candidate.bic is not None and best_bic is not None:
         above = candidate.bic - best_bic
     tag = '<br><span class="tag">✔ chosen</span>' if candidate.chosen else ""
+    if not candidate.converged:
+        tag += f'<br><span class="soft">did not converge: {_text(candidate.message)}</span>'
     parameters = "".join(
         f'<span class="parameter"><span class="name">{_text(p.name)}</span> {_value_of(p)}</span>'
         for p in candidate.parameters
@@ -255,7 +257,6 @@ def _candidate(candidate: Candidate, best_bic: float | None) -> str:
         "#" + (f"{_number(100 * rms, '.3g')} %" if math.isfinite(rms) else "—"),
         "#" + _number(candidate.reduced_chi2, ".3g"),
         "#" + _number(above, ".3g" if abs(above) >= 1000 else ".1f"),
-        "yes" if candidate.converged else _text(f"no: {candidate.message}"),
     )
     return _row(cells, "chosen" if candidate.chosen else "")
 

@@ -11,6 +11,8 @@ from instrument.errors import DeviceError
 from sim.render import FloatImage, electrons_per_s
 from sim.scene import Scene, key_of
 
+View = tuple[object, ...]  # what the picture depends on but for exposure and lamp level
+
 
 class SimulatedCamera:
     """Renders the scene. Noise is keyed by the plan's step and the frame's number within it.
@@ -25,9 +27,11 @@ class SimulatedCamera:
         self._settings = scene.rig.camera
         self._exposure_s = self._settings.min_exposure_s
         self._step, self._serial = -1, 0
-        self._view: tuple[object, ...] = ()
-        self._light = np.zeros((1, 1), np.float32)
         shape = (self._settings.height_px, self._settings.width_px)
+        self._light_for: View = ()
+        self._light = self._black = np.zeros(shape, np.float32)
+        self._expected_for: tuple[View, float, float] = ((), 0.0, 0.0)
+        self._expected = (self._light, self._light)
         self._noise = np.empty(shape, np.float32)
         self._counts = np.empty(shape, np.uint16)
 
@@ -64,9 +68,29 @@ class SimulatedCamera:
         return Frame(image, self._exposure_s, self._clock.now_s())
 
     def _mean_and_spread_dn(self) -> tuple[FloatImage, FloatImage]:
-        """Expected counts of every pixel and their standard deviation, before rounding."""
+        """Expected counts of every pixel and their standard deviation, before rounding.
+
+        Kept while view, exposure and lamp (to 1e-6 of its level) are the same.
+        """
+        scene = self._scene
+        level = round(scene.lamp_level(self._clock.now_s()), 6) if scene.lit else 0.0
+        view = (scene.surface, *sorted(scene.true_deg.items()))
+        key = (view, self._exposure_s, level)
+        if key != self._expected_for:
+            light = self._light_of(view) if scene.lit else self._black
+            self._expected = self._counts_of(light, level)
+            self._expected_for = key
+        return self._expected
+
+    def _light_of(self, view: View) -> FloatImage:
+        """Electrons per second at the lamp's full level."""
+        if view != self._light_for:
+            self._light, self._light_for = electrons_per_s(self._scene), view
+        return self._light
+
+    def _counts_of(self, light: FloatImage, level: float) -> tuple[FloatImage, FloatImage]:
         s = self._settings
-        electrons = self._expected_electrons_per_s() * np.float32(self._exposure_s)
+        electrons = light * np.float32(level * self._exposure_s)
         electrons += np.float32(s.dark_current_electrons_per_s * self._exposure_s)
         np.minimum(electrons, np.float32(s.full_well_electrons), out=electrons)
         spread = np.sqrt(electrons + np.float32(s.read_noise_electrons**2))
@@ -75,18 +99,6 @@ class SimulatedCamera:
         electrons *= gain
         electrons += np.float32(s.black_level_dn)
         return electrons, spread
-
-    def _expected_electrons_per_s(self) -> FloatImage:
-        scene = self._scene
-        if not scene.lit:
-            return np.zeros_like(self._noise)
-        view = (scene.surface, *sorted(scene.true_deg.items()))
-        if view != self._view:
-            self._light = electrons_per_s(scene)
-            self._view = view
-        level = np.float32(scene.lamp_level(self._clock.now_s()))
-        lit: FloatImage = self._light * level
-        return lit
 
     def _normal(self) -> FloatImage:
         """Standard normal noise. OpenCV's generator is four times as fast as NumPy's here."""
