@@ -8,8 +8,6 @@ scan ends in any other way its input closes, and it ends without having touched 
 from __future__ import annotations
 
 import importlib
-import json
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -24,8 +22,12 @@ class Afterwards:
     """The waiting process; use it with `with`, and call `finish` once the record is complete."""
 
     def __init__(self, folder: Path, as_json: bool) -> None:
-        command = [sys.executable, "-m", "acquisition.afterwards", str(folder), str(int(as_json))]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, text=True)
+        form = "json" if as_json else "text"
+        command = [sys.executable, "-m", "acquisition.afterwards", str(folder), form]
+        # A session of its own: Ctrl-C is the scan's business.
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, text=True, start_new_session=True
+        )
         self._folder = folder
 
     def __enter__(self) -> Afterwards:
@@ -51,13 +53,17 @@ class Afterwards:
 
 def main() -> None:
     """The other side: load, wait for the word, finish the run."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the scan's business
     from acquisition.run import report_run
 
     for name in ("acquisition.results", "matplotlib.figure", "matplotlib.backends.backend_svg"):
         importlib.import_module(name)
-    if sys.stdin.readline() == GO:
-        report_run(Path(sys.argv[1]), bool(json.loads(sys.argv[2])))
+    if sys.stdin.readline() != GO:
+        return
+    try:
+        report_run(Path(sys.argv[1]), sys.argv[2] == "json")
+    except GonioError as error:
+        sys.stderr.write(f"{error}\n")
+        sys.exit(error.exit_code)
 
 
 if __name__ == "__main__":
