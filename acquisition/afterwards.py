@@ -8,6 +8,7 @@ scan ends in any other way its input closes, and it ends without having touched 
 from __future__ import annotations
 
 import importlib
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -23,7 +24,8 @@ class Afterwards:
 
     def __init__(self, folder: Path, as_json: bool) -> None:
         form = "json" if as_json else "text"
-        command = [sys.executable, "-m", "acquisition.afterwards", str(folder), form]
+        # -P: nothing in the folder that one happens to stand in is taken for the program.
+        command = [sys.executable, "-P", "-m", "acquisition.afterwards", str(folder), form]
         # A session of its own: Ctrl-C is the scan's business.
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, text=True, start_new_session=True
@@ -42,8 +44,15 @@ class Afterwards:
         self._process.communicate()
 
     def finish(self) -> None:
-        """Fit, report, print; raises `GonioError` when that process fails."""
-        self._process.communicate(GO)
+        """Fit, report, print; raises `GonioError` when that process fails.
+
+        The scan is over: a Ctrl-C that comes now has nothing left to stop.
+        """
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            self._process.communicate(GO)
+        finally:
+            signal.signal(signal.SIGINT, before)
         if self._process.returncode != 0:
             raise GonioError(
                 f"{self._folder}: the record is complete, but fit and report have failed: "
@@ -61,9 +70,9 @@ def main() -> None:
         return
     try:
         report_run(Path(sys.argv[1]), sys.argv[2] == "json")
-    except GonioError as error:
+    except (GonioError, OSError) as error:
         sys.stderr.write(f"{error}\n")
-        sys.exit(error.exit_code)
+        sys.exit(1)
 
 
 if __name__ == "__main__":

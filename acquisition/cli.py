@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -43,17 +43,13 @@ def run(
     protocol: ProtocolFile, rig: RigFile = None, out: OutFolder = None, json: Json = False
 ) -> None:
     """Run a scan from a protocol: measure, fit, report."""
-    from acquisition.run import run_protocol
-
-    _do(lambda: run_protocol(protocol, rig, out, json))
+    _do("run_protocol", protocol, rig, out, json)
 
 
 @app.command()
 def plan(protocol: ProtocolFile, rig: RigFile = None, json: Json = False) -> None:
     """Show what a scan would do and how long it takes; no device is touched."""
-    from acquisition.run import show_plan
-
-    _do(lambda: show_plan(protocol, rig, json))
+    _do("show_plan", protocol, rig, json)
 
 
 @app.command()
@@ -65,36 +61,38 @@ def resume(
     json: Json = False,
 ) -> None:
     """Go on with a run that was stopped, at the first geometry that is not in its record."""
-    from acquisition.run import resume_run
-
-    _do(lambda: resume_run(folder, yes, json))
+    _do("resume_run", folder, yes, json)
 
 
 @app.command()
 def report(folder: RunFolder, json: Json = False) -> None:
     """Fit a finished run again and write its tables and its report anew."""
-    from acquisition.run import report_run
-
-    _do(lambda: report_run(folder, json))
+    _do("report_run", folder, json)
 
 
 def main() -> None:
     """Entry point of the `gonio` command."""
     signal.signal(signal.SIGTERM, _as_interrupt)
-    app()
+    try:
+        app()
+    except KeyboardInterrupt:
+        sys.exit(OperatorStop.exit_code)
 
 
 def _as_interrupt(number: int, frame: object) -> None:  # noqa: ARG001 - a signal handler's form
     raise KeyboardInterrupt
 
 
-def _do(command: Callable[[], None]) -> None:
-    """Run a command; what is expected to go wrong becomes a message and an exit code."""
+def _do(command: str, *arguments: object) -> None:
+    """Run a command of `acquisition.run`; what can go wrong becomes a message and an exit code."""
     try:
-        command()
+        getattr(importlib.import_module("acquisition.run"), command)(*arguments)
     except GonioError as error:
         sys.stderr.write(f"{error}\n")
         raise typer.Exit(error.exit_code) from None
+    except OSError as error:
+        sys.stderr.write(f"{error}\n")
+        raise typer.Exit(1) from None
     except KeyboardInterrupt:
         sys.stderr.write("stopped by the operator\n")
         raise typer.Exit(OperatorStop.exit_code) from None

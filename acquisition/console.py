@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from acquisition.plan import Plan, Step, lamp_settings
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from acquisition.results import Outcome
 
 # Progress and prompts go to standard error: standard output may be JSON.
-console = Console(stderr=True)
-out = Console()
+console = Console(stderr=True, markup=False)
+out = Console(markup=False)
 
 
 def duration_text(seconds: float) -> str:
@@ -31,20 +31,28 @@ def duration_text(seconds: float) -> str:
 
 
 @contextmanager
-def progress(plan: Plan, done_steps: int) -> Iterator[Callable[[Step], None]]:
+def progress(plan: Plan, done: frozenset[int]) -> Iterator[Callable[[Step], None]]:
     """A bar over the planned time, with the time left; yields what to call after each step."""
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description:30}"),
         BarColumn(),
-        MofNCompleteColumn(),
+        TextColumn("{task.fields[count]}"),
         TextColumn("time left"),
         TimeRemainingColumn(compact=True),
     )
+    ready, total = len(done), len(plan.steps)
+    start_s = int(sum(step.duration_s for step in plan.steps if step.index in done))
+    planned_s = sum(step.duration_s for step in plan.steps)
     with Progress(*columns, console=console) as bar:
-        task = bar.add_task("scan", total=len(plan.steps), completed=done_steps)
+        task = bar.add_task(
+            "homing, darks", total=planned_s, completed=start_s, count=f"{ready}/{total}"
+        )
 
         def on_step(step: Step) -> None:
-            bar.update(task, advance=1, description=_where(step))
+            nonlocal ready
+            ready += 1
+            count = f"{ready}/{total}"
+            bar.update(task, advance=step.duration_s, description=_where(step), count=count)
 
         yield on_step
 

@@ -10,28 +10,31 @@ import numpy as np
 from instrument.geometry import FloatArray
 from instrument.record import Reading
 
+LEAST_SIGNAL_U = 10.0  # a check with less signal than this many u follows noise and not the lamp
+
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """The lamp's level relative to the first check; without checks it is 1 throughout.
+    """The lamp's level in one block relative to its first check; without checks 1 throughout.
 
-    `u_level` is the relative standard uncertainty of a level between the checks.
+    times_s, level, u_relative: one entry a check; u_relative is the noise of that check.
     """
 
     times_s: FloatArray
     level: FloatArray
-    u_level: float
+    u_relative: FloatArray
 
     @classmethod
     def of(cls, readings: Sequence[Reading], block: int) -> Drift:
-        """From the unflagged checks made in one block of the plan."""
-        checks = [r for r in readings if r.kind == "drift" and r.block == block and not r.flags]
+        """From the usable checks made in one block of the plan."""
+        checks = [r for r in readings if r.kind == "drift" and r.block == block and usable(r)]
         rates = np.array([rate(r) for r in checks])
-        times = np.array([r.time_s for r in checks])
-        # The same geometry again: placement and rounding are the same each time, noise is not.
-        noise = [r.u_noise_dn / r.signal_dn for r in checks]
-        u_level = float(np.sqrt(2.0) * np.median(noise)) if noise else 0.0  # a ratio of two
-        return cls(times, rates / rates[0] if rates.size else rates, u_level)
+        return cls(
+            np.array([r.time_s for r in checks]),
+            rates / rates[0] if rates.size else rates,
+            # The same geometry again: placement and rounding are the same each time, noise is not.
+            np.array([r.u_noise_dn / r.signal_dn for r in checks]),
+        )
 
     @property
     def _slope_per_s(self) -> float:
@@ -56,6 +59,22 @@ class Drift:
         if not self.times_s.size:
             return 0.0
         return abs(self._slope_per_s * self._outside_s(time_s)) / 2
+
+    def shifts(self, time_s: float) -> FloatArray:
+        """What one standard deviation of each check's noise does to a value corrected by `at`.
+
+        Relative; a value between two checks has a part of both, and every value the opposite of
+        the first one's, to which the levels are referred.
+        """
+        shares = np.array([np.interp(time_s, self.times_s, row) for row in np.eye(len(self.level))])
+        if shares.size:
+            shares[0] -= 1.0
+        return -shares * self.u_relative
+
+
+def usable(check: Reading) -> bool:
+    """Whether a drift check shows the lamp: nothing flagged, and far more signal than noise."""
+    return not check.flags and check.signal_dn > max(LEAST_SIGNAL_U * check.u_noise_dn, 0.0)
 
 
 def rate(reading: Reading) -> float:

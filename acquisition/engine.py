@@ -57,28 +57,34 @@ class Engine:
         self._surface: Surface | None = None
         self._exposer = Exposer(devices.camera, devices.lamp, devices.clock, protocol, rig, record)
 
-    def run(self, plan: Plan, done: frozenset[int] = frozenset()) -> None:
-        """Run all steps but those `done` already; leaves a safe rig behind, whatever happens."""
+    def run(self, plan: Plan, done: frozenset[int] = frozenset(), elapsed_s: float = 0.0) -> None:
+        """Run all steps but those `done` in the `elapsed_s` that the scan has taken already.
+
+        Leaves a safe rig behind, whatever happens.
+        """
         try:
-            self._prepare(plan)
+            self._prepare(plan, elapsed_s)
             self._scan([step for step in plan.steps if step.index not in done])
         finally:
             self._make_safe()
 
-    def _prepare(self, plan: Plan) -> None:
+    def _prepare(self, plan: Plan, elapsed_s: float) -> None:
         """Write down who answers, home, take the darks that need a hand."""
         self._record.add_device("camera", self._devices.camera.identity())
         self._record.add_device("lamp", self._devices.lamp.identity())
         for name, axis in self._devices.axes.items():
             self._record.add_device(name, axis.identity())
             axis.home()
-        self._exposer.begin(plan.darks_first_s)
+        self._exposer.begin(plan.darks_first_s, elapsed_s)
 
     def _scan(self, steps: Sequence[Step]) -> None:
         pose, waiting = home_pose(self._rig), None
         for step in steps:
             self._devices.begin_step(step.index)
-            self._place(step.surface)
+            if step.surface != self._surface:
+                self._accept(waiting)  # the operator may take their time, or give up
+                waiting = None
+                self._place(step.surface)
             moves = moves_between(pose, step.pose, self._rig)
             started = self._start_first(moves)
             self._accept(waiting)
@@ -108,8 +114,6 @@ class Engine:
 
     def _place(self, surface: Surface) -> None:
         """Have the operator put sample or white tile on the table."""
-        if surface == self._surface:
-            return
         name = self._protocol.sample.name if surface == "sample" else "the white tile"
         request = Request("place", f"Put {name} on the sample table", surface=surface)
         answer = self._devices.operator.ask(request)

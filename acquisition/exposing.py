@@ -45,9 +45,9 @@ class Exposer:
     _darks: dict[float, Dark] = field(default_factory=dict)
     _rate_dn_per_s: dict[Surface, float] = field(default_factory=dict)
 
-    def begin(self, darks_first_s: Sequence[float]) -> None:
-        """Start the scan's time; take the darks for which the operator covers the lamp."""
-        self._start_s = self.clock.now_s()
+    def begin(self, darks_first_s: Sequence[float], elapsed_s: float) -> None:
+        """Start the scan's time, or go on with it; take the darks that need a hand."""
+        self._start_s = self.clock.now_s() - elapsed_s
         if darks_first_s:
             self._take_darks(darks_first_s)
 

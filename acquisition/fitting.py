@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from acquisition.reduction import Reduced, root_sum_square
 from analysis.acceptance import Acceptance
 from analysis.choice import LADDER, Choice, choose
-from analysis.fit import FitResult, fit
+from analysis.fit import FitResult, stated_u
 from analysis.measurements import Measurements
-from analysis.models import MODELS
 from instrument.config import Loaded
 from instrument.errors import NotDetermined
 from instrument.geometry import FloatArray
@@ -60,13 +59,13 @@ def fit_run(reduced: Reduced, loaded: Loaded) -> Fitted:
     return Fitted(choice, reduced.sound, choice.reason)
 
 
-def u_without(
+def cost_of(
     names: Sequence[str], reduced: Reduced, chosen: FitResult, loaded: Loaded
-) -> Mapping[str, float | None]:
-    """Uncertainties of the chosen model's parameters if some parts of u were not there."""
-    finer = measurements(reduced, loaded, without=names)
-    acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
-    return fit(MODELS[chosen.model], finer, acceptance=acceptance).u
+) -> dict[str, tuple[float, float]]:
+    """u of each determined parameter of the chosen model with, and without, some parts of u."""
+    with_them = stated_u(chosen, measurements(reduced, loaded))
+    without = stated_u(chosen, measurements(reduced, loaded, without=names))
+    return {name: (with_them[name], without[name]) for name in with_them}
 
 
 def measurements(reduced: Reduced, loaded: Loaded, without: Sequence[str] = ()) -> Measurements:
@@ -81,7 +80,7 @@ def measurements(reduced: Reduced, loaded: Loaded, without: Sequence[str] = ()) 
         np.array([p.theta_r_deg for p in points]),
         np.array([p.dphi_deg for p in points]),
         brdf,
-        root_sum_square(own) * brdf,
+        root_sum_square(own) * np.abs(brdf),
         lamp_setting=np.array([p.lamp_setting for p in points], dtype=np.int64),
         shared=tuple(e.of(keep) for e in shared if e.name not in without),
         u_theta_i_deg=axes.theta_i.u_deg,

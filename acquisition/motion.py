@@ -6,12 +6,14 @@ zones. Every angle is approached from below (the play of the gears is then alway
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import permutations
 from typing import NamedTuple
 
 from acquisition.keep_out import obstacle
+from instrument.errors import InputError
 from instrument.kinematics import Trapezoid
 from instrument.rig_config import AXES, HandAxis, Rig
 
@@ -38,8 +40,12 @@ class Move:
     duration_s: float
 
 
-class NoPathError(ValueError):
-    """No order of the axes leads from one pose to another without meeting a keep-out zone."""
+class NoPathError(InputError):
+    """No order of the axes leads from one pose to another; `cause` is what stands in the way."""
+
+    def __init__(self, way: str, cause: str, move: str) -> None:
+        super().__init__(f"{way}: {move}")
+        self.cause, self.move = cause, move
 
 
 def home_pose(rig: Rig) -> Pose:
@@ -53,20 +59,20 @@ def home_pose(rig: Rig) -> Pose:
 
 
 def moves_between(start: Pose, end: Pose, rig: Rig) -> tuple[Move, ...]:
-    """The moves from `start` to `end`, hand-set axes first, clear of all keep-out zones.
+    """The moves from `start` to `end` clear of all keep-out zones, hand-set axes first if they can.
 
-    Raises `NoPathError` with the zone's name when every order of the axes meets one.
+    Raises `NoPathError` with what is in the way when every order of the axes meets something.
     """
     changed = [n for n in AXES if not abs(getattr(end, n) - getattr(start, n)) <= SAME_DEG]
-    hands = [n for n in changed if isinstance(rig.axes[n], HandAxis)]
-    motors = [n for n in changed if n not in hands]
-    problem = ""
-    for order in permutations(motors):
-        moves = tuple(_moves(start, end, (*hands, *order), rig))
-        problem = _obstacle_on(start, moves, rig)
-        if not problem:
+    changed.sort(key=lambda name: not isinstance(rig.axes[name], HandAxis))
+    found: tuple[str, str] | None = None
+    for order in permutations(changed):
+        moves = tuple(_moves(start, end, order, rig))
+        obstacle_here = _obstacle_on(start, moves, rig)
+        if obstacle_here is None:
             return moves
-    raise NoPathError(f"from {start} to {end}: {problem}")
+        found = found or obstacle_here
+    raise NoPathError(f"from {start} to {end}", *(found or ("", "")))
 
 
 def _moves(start: Pose, end: Pose, order: tuple[str, ...], rig: Rig) -> Iterator[Move]:
@@ -90,24 +96,28 @@ def axis_moves(name: str, start_deg: float, end_deg: float, rig: Rig) -> Iterato
         start_deg = stop_deg
 
 
-def _obstacle_on(start: Pose, moves: tuple[Move, ...], rig: Rig) -> str:
-    """What the moves would meet, in words; empty when the whole path is clear."""
+def _obstacle_on(start: Pose, moves: tuple[Move, ...], rig: Rig) -> tuple[str, str] | None:
+    """What the moves would meet: the cause and the move in words; None when all is clear."""
     pose = start
     for move in moves:
         axis = rig.axes[move.axis]
         if not axis.min_deg - SAME_DEG <= move.angle_deg <= axis.max_deg + SAME_DEG:
             return (
+                f"limits of {move.axis}",
                 f"{move.axis} would go to {move.angle_deg:g} deg to take up the backlash; its "
-                f"limits are {axis.min_deg:g} to {axis.max_deg:g} deg"
+                f"limits are {axis.min_deg:g} to {axis.max_deg:g} deg: stay further inside them",
             )
-        first = move.angle_deg if isinstance(axis, HandAxis) else getattr(pose, move.axis)
+        first = getattr(pose, move.axis)
+        if math.isnan(first):  # nobody knows where a hand takes it from: only the end is checked
+            first = move.angle_deg
         target = pose._replace(**{move.axis: move.angle_deg})
         begin = pose._replace(**{move.axis: first})
         for zone in rig.keep_out:
             if obstacle(zone, begin, target, move.axis):
                 return (
+                    f"keep-out zone {zone.name}",
                     f"the move of {move.axis} from {first:g} to {move.angle_deg:g} deg meets the "
-                    f"keep-out zone '{zone.name}'"
+                    f"keep-out zone '{zone.name}': leave these angles out, or split the sweep",
                 )
         pose = target
-    return ""
+    return None

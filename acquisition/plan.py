@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
 
 from acquisition.exposure import expected_exposure_s, exposure_ladder_s
 from acquisition.motion import Move, NoPathError, Pose, home_pose, moves_between
@@ -20,8 +19,7 @@ from instrument.geometry import camera_to_lamp_deg, cone_half_angle_deg
 from instrument.protocol_config import Protocol, Sweep, angles_deg
 from instrument.record import Kind
 from instrument.rig_config import AXES, HandAxis, Rig
-
-HOMING_S = 5.0  # assumed for each motor axis
+from instrument.yaml_marks import place
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,21 +70,24 @@ def make_plan(loaded: Loaded) -> Plan:
     visible = [pose for pose in poses if _separation_deg(pose) >= limit_deg]
     if not visible:
         raise InputError(
-            f"{loaded.protocol_path}: sweeps: camera and lamp hide one another (closer than "
-            f"{limit_deg:.2f} deg) in all {len(poses)} geometries: choose other angles"
+            f"{_place(loaded, 'sweeps')}: camera and lamp hide one another in all {len(poses)} "
+            f"geometries; allowed: angles {limit_deg:.2f} deg or more apart"
         )
     steps = _with_previews(_in_order(visible, protocol, rig))
-    _check_references(steps, limit_deg, loaded)
+    problems = [*_hidden_references(steps, limit_deg, loaded), *_closed_ways(steps, loaded)]
+    if problems:
+        raise InputError(*problems)
     return _scheduled(steps, hidden, loaded)
+
+
+def _place(loaded: Loaded, *path: str) -> str:
+    return place(loaded.protocol_path, loaded.protocol_text, path)
 
 
 def hidden_below_deg(rig: Rig) -> float:
     """Camera and lamp hide one another when their directions are closer than this."""
-    if rig.blocked_half_angle_deg is not None:
-        return rig.blocked_half_angle_deg
-    return cone_half_angle_deg(rig.source_solid_angle_sr) + cone_half_angle_deg(
-        rig.receiver_solid_angle_sr
-    )
+    cones = (rig.source_solid_angle_sr, rig.receiver_solid_angle_sr)
+    return max(rig.blocked_half_angle_deg or 0.0, sum(map(cone_half_angle_deg, cones)))
 
 
 def sweep_poses(sweep: Sweep, rig: Rig) -> list[Pose]:
@@ -115,13 +116,18 @@ def _separation_deg(pose: Pose) -> float:
 
 
 def _in_order(poses: Sequence[Pose], protocol: Protocol, rig: Rig) -> list[Step]:
-    """Points with their references, block by block; tile and sample change places once a block."""
+    """Points with their references, block by block; tile and sample change places once a block.
+
+    A block holds all points, of whichever sweep, that one setting of the lamp by hand serves.
+    """
     hands = [n for n in ("theta_i", "dphi") if isinstance(rig.axes[n], HandAxis)]
     numbers: dict[tuple[int, float, float], int] = {}
     steps: list[Step] = []
-    blocks = groupby(poses, key=lambda pose: tuple(getattr(pose, name) for name in hands))
-    for block, (_, group) in enumerate(blocks):
-        sample, tile = _block(list(group), protocol)
+    blocks: dict[tuple[float, ...], list[Pose]] = {}
+    for pose in poses:
+        blocks.setdefault(tuple(getattr(pose, name) for name in hands), []).append(pose)
+    for block, group in enumerate(blocks.values()):
+        sample, tile = _block(group, protocol)
         for kind, pose in [*tile, *sample] if block % 2 == 0 else [*sample, *tile]:
             key = (block, pose.theta_i, pose.dphi)
             setting = numbers.setdefault(key, len(numbers))
@@ -174,52 +180,66 @@ def _with_previews(steps: Sequence[Step]) -> list[Step]:
     return [replace(step, preview=step.index in chosen) for step in steps]
 
 
-def _check_references(steps: Sequence[Step], limit_deg: float, loaded: Loaded) -> None:
+def _hidden_references(steps: Sequence[Step], limit_deg: float, loaded: Loaded) -> Iterator[str]:
     """A reference that the lamp hides cannot be measured."""
-    problems = {
-        f"{loaded.protocol_path}: references.{name}.theta_r_deg: {step.pose.theta_r:g} deg is "
-        f"hidden by the lamp at theta_i {step.pose.theta_i:g} deg: stay {limit_deg:.2f} deg clear"
-        for step in steps
-        for kind, name in (("tile", "white_tile"), ("drift", "drift_check"))
-        if step.kind == kind and _separation_deg(step.pose) < limit_deg
-    }
-    if problems:
-        raise InputError(*sorted(problems))
+    hidden = [step for step in steps if _separation_deg(step.pose) < limit_deg]
+    for kind, name in (("tile", "white_tile"), ("drift", "drift_check")):
+        lamps = sorted({step.pose.theta_i for step in hidden if step.kind == kind})
+        if lamps:
+            view = next(step.pose.theta_r for step in hidden if step.kind == kind)
+            yield (
+                f"{_place(loaded, 'references', name, 'theta_r_deg')}: {view:g} deg is hidden by "
+                f"the lamp at theta_i {', '.join(f'{angle:g}' for angle in lamps)} deg; allowed: "
+                f"{limit_deg:.2f} deg or more from the lamp"
+            )
+
+
+def _closed_ways(steps: Sequence[Step], loaded: Loaded) -> Iterator[str]:
+    """Moves that no order of the axes can make, one line for each thing in the way."""
+    closed: dict[str, list[str]] = {}
+    for step, before in zip(steps, (None, *steps), strict=False):
+        try:
+            moves_between(_start(before, loaded.rig), step.pose, loaded.rig)
+        except NoPathError as error:
+            closed.setdefault(error.cause, []).append(error.move)
+    for moves in closed.values():
+        more = f" (and {len(moves) - 1} other moves)" if len(moves) > 1 else ""
+        yield f"{_place(loaded, 'sweeps')}: {moves[0]}{more}; see {loaded.rig_path}"
+
+
+def _start(before: Step | None, rig: Rig) -> Pose:
+    return home_pose(rig) if before is None else before.pose
 
 
 def _scheduled(steps: Sequence[Step], hidden: tuple[Pose, ...], loaded: Loaded) -> Plan:
-    """Add every step's moves and its time; refuses a way through a keep-out zone."""
-    protocol, rig = loaded.protocol, loaded.rig
+    """Add every step's moves and its time."""
+    rig = loaded.rig
     by_hand = rig.lamp.darkened_by == "hand"
     darks = exposure_ladder_s(rig.camera) if by_hand else ()
-    time_s = _homing_s(rig) + sum(_frames_s(protocol.dark_frames, e, rig) for e in darks)
-    time_s += 2 * rig.lamp.cover_s if by_hand else 0.0
-    done: list[Step] = []
-    problems: list[str] = []
-    seen: set[float] = set()
+    first_s = _homing_s(rig) + (_darks_s(darks, rig.lamp.cover_s, loaded) if by_hand else 0.0)
+    time_s, seen, done = first_s, set(darks), []
     for step, before in zip(steps, (None, *steps), strict=False):
-        start = home_pose(rig) if before is None else before.pose
-        try:
-            moves = moves_between(start, step.pose, rig)
-        except NoPathError as error:
-            problems.append(f"{loaded.protocol_path}: sweeps: {error}: see {loaded.rig_path}")
-            continue
-        duration = _duration_s(step, before, moves, rig)
-        if not by_hand and step.expected_exposure_s not in seen:
+        moves = moves_between(_start(before, rig), step.pose, rig)
+        duration_s = _duration_s(step, before, moves, rig)
+        if step.expected_exposure_s not in seen:
             seen.add(step.expected_exposure_s)
-            duration += _frames_s(protocol.dark_frames, step.expected_exposure_s, rig)
-            duration += 2 * rig.lamp.shutter_s
-        done.append(replace(step, moves=moves, start_s=time_s, duration_s=duration))
-        time_s += duration
-    if problems:
-        raise InputError(*dict.fromkeys(problems))
+            duration_s += _darks_s((step.expected_exposure_s,), rig.lamp.shutter_s, loaded)
+        done.append(replace(step, moves=moves, start_s=time_s, duration_s=duration_s))
+        time_s += duration_s
     swaps = sum(_swapped(step, before) for step, before in zip(steps, (None, *steps), strict=False))
     hands = sum(isinstance(rig.axes[m.axis], HandAxis) for step in done for m in step.moves)
-    return Plan(tuple(done), hidden, tuple(darks), time_s, swaps, hands)
+    return Plan(tuple(done), hidden, darks, time_s, swaps, hands)
+
+
+def _darks_s(exposures_s: Sequence[float], cover_s: float, loaded: Loaded) -> float:
+    """Darken the lamp, take the darks of these exposures, light it again."""
+    frames = loaded.protocol.dark_frames
+    return 2 * cover_s + sum(_frames_s(frames, e, loaded.rig) for e in exposures_s)
 
 
 def _homing_s(rig: Rig) -> float:
-    return HOMING_S * sum(not isinstance(rig.axes[name], HandAxis) for name in AXES)
+    motors = [axis for axis in (rig.axes[name] for name in AXES) if not isinstance(axis, HandAxis)]
+    return sum(axis.homing_s for axis in motors)
 
 
 def _frames_s(frames: int, exposure_s: float, rig: Rig) -> float:

@@ -69,13 +69,13 @@ def measure(
     mean, variance = _mean_and_variance(crops, camera)
     saturated = sum(int(np.count_nonzero(counts >= camera.max_dn)) for counts in counted)
     peak = bright_level(counted[0]) if counted[0].size else float("nan")
-    slope = _slope_per_column(frames, dark, window)
+    dark_noise = _noise(window, dark.variance[window.crop] / dark.frames)
     return Signal(
         window.mean(mean - dark.mean[window.crop]),
-        _noise(window, variance / len(frames) + dark.variance[window.crop] / dark.frames),
+        _noise(window, variance / len(frames)),
         _rounding(window, mean, camera),
-        _rounding(window, dark.mean[window.crop], camera),
-        u_placement_mm * window.columns_per_mm * slope,
+        float(np.hypot(dark_noise, _rounding(window, dark.mean[window.crop], camera))),
+        u_placement_mm * _change_per_mm(frames, dark, window),
         saturated,
         peak,
         _flags(window, min_pixels, saturated, peak, camera),
@@ -133,16 +133,35 @@ def rounding_u_dn(noise_variance_dn2: float) -> float:
     return float(np.sqrt(damped.sum()))
 
 
-def _slope_per_column(frames: Sequence[Frame], dark: Dark, window: Window) -> float:
-    """How fast the window's mean changes when the window moves along a row, DN per pixel."""
-    rows, columns = window.crop
-    if not window.inside_frame or columns.start < 1 or columns.stop >= dark.mean.shape[1]:
+def _change_per_mm(frames: Sequence[Frame], dark: Dark, window: Window) -> float:
+    """How the window's mean changes when the surface stands 1 mm nearer to the camera, DN per mm.
+
+    The surface then appears shifted, and the window sees what belongs on the other side.
+    """
+    columns, rows = window.shift_px_per_mm
+    across = _slope(frames, dark, window, (0, 1)) * columns
+    return -(across + _slope(frames, dark, window, (1, 0)) * rows)
+
+
+def _slope(frames: Sequence[Frame], dark: Dark, window: Window, step: tuple[int, int]) -> float:
+    """Change of the window's mean when the window moves by `step` (rows, columns), DN."""
+    ahead, behind = (_moved(window.crop, by, step) for by in (1, -1))
+    inside = all(s.start >= 0 for s in behind) and all(
+        s.stop <= size for s, size in zip(ahead, dark.mean.shape, strict=True)
+    )
+    if not window.inside_frame or not inside:
         return 0.0
-    left, right = (slice(columns.start + by, columns.stop + by) for by in (-1, 1))
     image = frames[0].image  # one frame is enough for a part of the uncertainty
-    change = image[rows, right].astype(np.float64) - image[rows, left]
-    change -= dark.mean[rows, right] - dark.mean[rows, left]
+    change = image[ahead].astype(np.float64) - image[behind]
+    change -= dark.mean[ahead] - dark.mean[behind]
     return window.mean(change) / 2
+
+
+def _moved(crop: tuple[slice, slice], by: int, step: tuple[int, int]) -> tuple[slice, slice]:
+    rows, columns = (
+        slice(s.start + by * n, s.stop + by * n) for s, n in zip(crop, step, strict=True)
+    )
+    return rows, columns
 
 
 def _flags(window: Window, min_pixels: int, saturated: int, peak_dn: float, camera: Camera) -> str:

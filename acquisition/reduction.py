@@ -20,7 +20,8 @@ from instrument.protocol_config import Protocol
 from instrument.record import Reading
 
 NOISE, ROUNDING, DRIFT = "photon and read noise", "rounding to counts", "lamp drift"
-DARK, PLACEMENT = "rounding of the dark", "sample placement"
+DARK, PLACEMENT = "dark frames", "sample placement"
+NO_TILE_YET, NO_SIGNAL = "no white tile yet", "no signal"
 TILE_READING, TILE = "white tile reading", "white tile certificate"
 
 
@@ -30,7 +31,8 @@ class Reduced:
 
     `components`: relative standard uncertainties by name, independent from point to point.
     `shared`: those of the radiance that points share; `shared_by_tile`: those that the comparison
-    with the tile adds. `drift`: time in s and lamp level of each check.
+    with the tile adds. `drift_levels`: the lamp's level at each usable check, block by block, of
+    `drift_checks` that were made.
     """
 
     points: tuple[Reading, ...]
@@ -40,13 +42,17 @@ class Reduced:
     shared: tuple[SharedError, ...]
     shared_by_tile: tuple[SharedError, ...]
     flags: tuple[str, ...]
-    drift: tuple[tuple[float, float], ...]
+    drift_levels: tuple[FloatArray, ...]
+    drift_checks: int
 
     @property
     def parts(self) -> dict[str, FloatArray]:
         """Every relative standard uncertainty of the BRDF by name, shared or not, 0 or more."""
-        shared = {e.name: np.abs(e.u_relative) for e in (*self.shared, *self.shared_by_tile)}
-        return {**self.components, **shared}
+        found = dict(self.components)
+        for error in (*self.shared, *self.shared_by_tile):
+            sofar = found.get(error.name, np.zeros(len(self.points)))
+            found[error.name] = np.hypot(sofar, error.u_relative)
+        return found
 
     @property
     def u_radiance(self) -> FloatArray:
@@ -58,7 +64,7 @@ class Reduced:
     def sound(self) -> NDArray[np.bool_]:
         """Points that may enter a fit: measured against a tile, and nothing flagged."""
         unflagged = np.array([not flags for flags in self.flags], dtype=bool)
-        return unflagged & np.isfinite(self.brdf) & (self.radiance > 0)
+        return unflagged & np.isfinite(self.brdf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,20 +90,18 @@ def reduce(readings: Sequence[Reading], protocol: Protocol) -> Reduced:
     radiance = np.array([rate(p) / drifts[p.block].at(p.time_s) for p in points])
     tile = protocol.references.white_tile
     known = tile.reflectance / np.pi if tile is not None else np.nan
-    white = np.array([tiles[p.lamp_setting].rate if tiles else np.nan for p in points])
+    own = [tiles.get(p.lamp_setting) for p in points]
+    white = np.array([np.nan if t is None else t.rate for t in own])
     return Reduced(
         points,
         radiance,
         radiance / white * known,
-        _components(points, drifts),
-        _shared(points),
-        _shared_by_tile(points, tiles, protocol) if tiles else (),
-        tuple(_flags(p, tiles.get(p.lamp_setting)) for p in points),
-        tuple(
-            (float(time_s), float(level))
-            for drift in drifts.values()
-            for time_s, level in zip(drift.times_s, drift.level, strict=True)
-        ),
+        _components(points),
+        (*_shared(readings, points), *_drift_noise(points, drifts)),
+        _shared_by_tile(points, own, protocol),
+        tuple(_flags(p, t, tile is not None) for p, t in zip(points, own, strict=True)),
+        tuple(drift.level for drift in drifts.values()),
+        sum(r.kind == "drift" for r in readings),
     )
 
 
@@ -118,33 +122,55 @@ def _tile(reading: Reading, drift: Drift) -> _Tile:
     )
 
 
-def _components(points: Sequence[Reading], drifts: Mapping[int, Drift]) -> dict[str, FloatArray]:
+def _components(points: Sequence[Reading]) -> dict[str, FloatArray]:
     return {
         NOISE: np.abs(_relative(points, "u_noise_dn")),
         ROUNDING: np.abs(_relative(points, "u_quantisation_dn")),
-        DRIFT: np.array([drifts[p.block].u_level for p in points]),
     }
 
 
-def _shared(points: Sequence[Reading]) -> tuple[SharedError, ...]:
-    """One dark serves an exposure, and the sample is placed once a block."""
+def _shared(readings: Sequence[Reading], points: Sequence[Reading]) -> tuple[SharedError, ...]:
+    """One dark serves an exposure; the sample is placed anew whenever the tile has been there."""
     exposures = np.unique([p.exposure_s for p in points], return_inverse=True)[1]
-    blocks = np.array([p.block for p in points], dtype=np.int64)
+    placed = {r.step: n for n, r in zip(_placements(readings), readings, strict=True)}
+    placements = np.array([placed[p.step] for p in points], dtype=np.int64)
     return (
         SharedError(DARK, _relative(points, "u_dark_dn"), exposures.astype(np.int64)),
-        SharedError(PLACEMENT, _relative(points, "u_placement_dn"), blocks),
+        SharedError(PLACEMENT, _relative(points, "u_placement_dn"), placements),
     )
 
 
+def _placements(readings: Sequence[Reading]) -> list[int]:
+    """How often sample and tile had changed places before each reading."""
+    before = (*readings[:1], *readings)
+    changes = [a.surface != b.surface for a, b in zip(readings, before, strict=False)]
+    return [int(n) for n in np.cumsum(changes)]
+
+
+def _drift_noise(points: Sequence[Reading], drifts: Mapping[int, Drift]) -> list[SharedError]:
+    """The noise of every drift check, which all points corrected with it share."""
+    errors = []
+    for block, drift in drifts.items():
+        shifts = np.array(
+            [
+                drift.shifts(p.time_s) if p.block == block else np.zeros(drift.level.size)
+                for p in points
+            ]
+        ).reshape(len(points), drift.level.size)
+        together = np.zeros(len(points), dtype=np.int64)
+        errors += [SharedError(DRIFT, column, together) for column in shifts.T]
+    return errors
+
+
 def _shared_by_tile(
-    points: Sequence[Reading], tiles: Mapping[int, _Tile], protocol: Protocol
+    points: Sequence[Reading], tiles: Sequence[_Tile | None], protocol: Protocol
 ) -> tuple[SharedError, ...]:
     """The tile is read once for every place of the lamp; its certificate holds for all."""
     tile = protocol.references.white_tile
     if tile is None:
         return ()
     settings = np.array([p.lamp_setting for p in points], dtype=np.int64)
-    u_reading = np.array([tiles[p.lamp_setting].u_relative for p in points])
+    u_reading = np.array([np.nan if t is None else t.u_relative for t in tiles])
     u_certificate = tile.u_reflectance / tile.reflectance
     return (
         SharedError(TILE_READING, u_reading, settings),
@@ -152,6 +178,11 @@ def _shared_by_tile(
     )
 
 
-def _flags(point: Reading, tile: _Tile | None) -> str:
-    tile_flags = f"white tile {tile.flags}" if tile is not None and tile.flags else ""
-    return "; ".join(f for f in (point.flags, tile_flags) if f)
+def _flags(point: Reading, tile: _Tile | None, expected: bool) -> str:
+    flags = [
+        point.flags,
+        NO_TILE_YET if tile is None and expected else "",
+        f"white tile {tile.flags}" if tile is not None and tile.flags else "",
+        NO_SIGNAL if point.signal_dn == 0 else "",
+    ]
+    return "; ".join(f for f in flags if f)

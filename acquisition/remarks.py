@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from acquisition.fitting import Fitted, u_without
+from acquisition.fitting import Fitted, cost_of
 from acquisition.reduction import DARK, NOISE, ROUNDING, Reduced
 from analysis.fit import FitResult
 from analysis.models import MODELS
@@ -76,6 +76,8 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
     """What else the operator should know."""
     tile = "the white tile is taken as Lambertian" if reduced.shared_by_tile else ""
     found = (
+        "all data are simulated" if loaded.rig.simulated else "",
+        _unfinished_note(record),
         fitted.reason if fitted.choice is not None else "",
         _hidden_note(record),
         _flag_note(reduced),
@@ -83,7 +85,6 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         _pull_note(fitted),
         _bits_note(reduced, fitted, loaded),
         tile,
-        "all data are simulated" if loaded.rig.simulated else "",
     )
     return tuple(note for note in found if note)
 
@@ -101,12 +102,27 @@ def _flag_note(reduced: Reduced) -> str:
     return f"{len(flagged)} of {len(reduced.flags)} points are flagged and not fitted: {kinds}"
 
 
+def _unfinished_note(record: Record) -> str:
+    planned, made = int(record.meta("steps") or 0), len(record.readings())
+    if made >= planned:
+        return ""
+    return (
+        f"the scan is not finished: {made} of {planned} readings; go on with: "
+        f"gonio resume {record.folder}"
+    )
+
+
 def _drift_note(reduced: Reduced) -> str:
-    if not reduced.drift:
+    if not reduced.drift_checks:
         return "no drift check was made: the lamp is taken as constant"
-    levels = [level for _, level in reduced.drift]
-    percent = 100 * (max(levels) - min(levels))
-    return f"the lamp's drift was followed and taken out: {percent:.2f} % over the scan"
+    followed = [np.ptp(level) for level in reduced.drift_levels if level.size > 1]
+    unusable = reduced.drift_checks - sum(level.size for level in reduced.drift_levels)
+    text = f"{unusable} of {reduced.drift_checks} drift checks are flagged or too dark to use"
+    if not followed:
+        return f"{text}: the lamp is taken as constant"
+    percent = 100 * max(followed)
+    note = f"the lamp's drift was followed and taken out: up to {percent:.2f} % at one setting"
+    return f"{note}; {text}" if unusable else note
 
 
 def _pull_note(fitted: Fitted) -> str:
@@ -123,16 +139,12 @@ def _bits_note(reduced: Reduced, fitted: Fitted, loaded: Loaded) -> str:
         return ""
     used = fitted.used
     rounding = np.hypot(reduced.parts[ROUNDING], reduced.parts[DARK])[used]
-    own = reduced.parts[NOISE][used]
     text = (
         f"what {bits} bits cost: rounding frames and darks to whole counts gives every point a "
         f"relative u of {100 * np.median(rounding):.2g} % (median; worst "
-        f"{100 * rounding.max():.2g} %), {np.median(rounding / own):.1f} times its noise"
+        f"{100 * rounding.max():.2g} %) beside {100 * np.median(reduced.parts[NOISE][used]):.2g} "
+        "% of noise"
     )
-    better = u_without((ROUNDING, DARK), reduced, fitted.chosen, loaded)
-    gains = [
-        f"u({name}) would be {u:.2g} instead of {now:.2g}"
-        for name, u in better.items()
-        if u is not None and (now := fitted.chosen.u[name]) is not None
-    ]
+    cost = cost_of((ROUNDING, DARK), reduced, fitted.chosen, loaded)
+    gains = [f"u({name}) {u:.2g} instead of {now:.2g}" for name, (now, u) in cost.items()]
     return f"{text}; without it {', '.join(gains)}" if gains else text

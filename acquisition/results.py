@@ -18,6 +18,7 @@ from analysis.choice import to_json
 from analysis.report import write_report
 from analysis.report_data import Parameter
 from instrument.config import Loaded
+from instrument.errors import NotDetermined
 from instrument.files import write_whole
 from instrument.geometry import FloatArray
 from instrument.record import Record
@@ -47,6 +48,10 @@ class Outcome:
 def finish(record: Record, loaded: Loaded) -> Outcome:
     """Reduce, fit and report; each file in the run's folder is written whole or not at all."""
     reduced = reduce(record.readings(), loaded.protocol)
+    if not reduced.points:
+        raise NotDetermined(
+            f"{record.folder}: no geometry has been measured yet: gonio resume {record.folder}"
+        )
     fitted = fit_run(reduced, loaded)
     u_brdf = fitted.u_brdf(reduced)
     outcome = Outcome(

@@ -23,15 +23,18 @@ WORDS = {
 }
 
 
-def open_devices(loaded: Loaded) -> Devices:
-    """Open every device of the rig file. The simulated scene answers the operator's prompts."""
+def open_devices(loaded: Loaded, elapsed_s: float = 0.0) -> Devices:
+    """Open every device of the rig file. The simulated scene answers the operator's prompts.
+
+    `elapsed_s` is the time that the scan has taken already: the simulated lamp has aged by it.
+    """
     sample = loaded.protocol.simulated_sample
     if sample is None:
         raise InputError(
             f"{loaded.protocol_path}: simulated_sample: missing, but the rig {loaded.rig_path} is "
             "simulated: say what the sample is"
         )
-    clock = SimulatedClock()
+    clock = SimulatedClock(elapsed_s)
     scene = Scene(loaded.rig, loaded.protocol, sample)
     operator = SimulatedOperator(scene, clock)
 

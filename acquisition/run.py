@@ -21,6 +21,7 @@ from acquisition.console import (
 )
 from acquisition.engine import Engine
 from acquisition.models import check_model
+from acquisition.motion import home_pose, moves_between
 from acquisition.plan import Plan, make_plan
 from acquisition.rig import open_devices
 from instrument.config import Loaded, load_protocol
@@ -53,8 +54,10 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
         _same_files(record, loaded)
         plan = make_plan(loaded)
         done = frozenset(reading.step for reading in record.readings())
-        if len(done) < len(plan.steps):
-            _confirm(yes, len(plan.steps) - len(done))
+        missing = [step for step in plan.steps if step.index not in done]
+        if missing:
+            moves_between(home_pose(loaded.rig), missing[0].pose, loaded.rig)  # or nothing moves
+            _confirm(yes, len(missing))
             _scan(loaded, plan, record, done)
         _finish(record, loaded, as_json)
 
@@ -62,7 +65,9 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
 def report_run(folder: Path, as_json: bool) -> None:
     """Fit a run again and write its tables and report anew; touches no device."""
     with Record.open(folder) as record:
-        _finish(record, _as_used(folder), as_json)
+        loaded = _as_used(folder)
+        _same_files(record, loaded)
+        _finish(record, loaded, as_json)
 
 
 def show_plan(protocol_path: Path, rig_path: Path | None, as_json: bool) -> None:
@@ -88,28 +93,29 @@ def _plan_json(plan: Plan) -> dict[str, object]:
 
 def _scan(loaded: Loaded, plan: Plan, record: Record, done: frozenset[int] = frozenset()) -> None:
     """Run the plan; whatever ends it early is in the record and in the message."""
-    devices = open_devices(loaded)
+    elapsed_s = max((reading.time_s for reading in record.readings()), default=0.0)
+    devices = open_devices(loaded, elapsed_s)
     console.print(
         f"{loaded.protocol.name}: {len(plan.points)} geometries, about "
         f"{duration_text(plan.duration_s)} on the rig ({loaded.rig.name}), into {record.folder}",
         highlight=False,
         soft_wrap=True,
     )
-    start_s = devices.clock.now_s()
+    clock = devices.clock
     try:
-        with progress(plan, len(done)) as on_step:
-            Engine(loaded.protocol, loaded.rig, devices, record, on_step).run(plan, done)
-    except KeyboardInterrupt:
-        _note(record, "stopped", "by the operator")
-        raise OperatorStop(
-            f"stopped by the operator: all motion has ended. {_go_on(record)}"
-        ) from None
+        with record.claimed(), progress(plan, done) as on_step:
+            engine = Engine(loaded.protocol, loaded.rig, devices, record, on_step)
+            engine.run(plan, done, elapsed_s)
+    except (KeyboardInterrupt, OperatorStop) as stop:
+        why = str(stop) or "stopped by the operator"
+        record.add_event(clock.utc().isoformat(), "stopped", why)
+        raise OperatorStop(f"{why}: all motion has ended. {_go_on(record)}") from None
     except DeviceError as error:
-        _note(record, "fault", str(error))
+        record.add_event(clock.utc().isoformat(), "fault", str(error))
         raise DeviceError(f"{error}\n{_go_on(record)}") from error
-    _note(record, "finished", f"{len(plan.steps)} steps")
-    record.set_meta("scan_s", f"{devices.clock.now_s() - start_s:.1f}")
-    record.set_meta("finished_utc", devices.clock.utc().isoformat(timespec="seconds"))
+    record.add_event(clock.utc().isoformat(), "finished", f"{len(plan.steps)} steps")
+    record.set_meta("scan_s", f"{clock.now_s():.1f}")
+    record.set_meta("finished_utc", clock.utc().isoformat(timespec="seconds"))
 
 
 def _go_on(record: Record) -> str:
@@ -117,10 +123,6 @@ def _go_on(record: Record) -> str:
         f"{len(record.readings())} readings are safe in {record.folder}. Go on with: "
         f"gonio resume {record.folder}"
     )
-
-
-def _note(record: Record, kind: str, text: str) -> None:
-    record.add_event(datetime.now(UTC).isoformat(), kind, text)
 
 
 def _finish(record: Record, loaded: Loaded, as_json: bool) -> None:

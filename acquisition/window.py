@@ -28,8 +28,8 @@ class Window:
     `weights` (rows, columns) over `crop`; their sum is 1 but for the division by cos^4.
     `counted`: pixels of the crop with a weight. `outline_px` (4, 2) as (column, row); `pixels`
     is the number of whole pixels' worth.
-    `columns_per_mm` is how far the picture moves along a row per mm that the surface stands off
-    the axis.
+    `shift_px_per_mm` (columns, rows): how far the surface's picture moves for every mm that it
+    stands nearer to the camera.
     """
 
     crop: tuple[slice, slice]
@@ -38,7 +38,7 @@ class Window:
     outline_px: FloatArray
     pixels: float
     inside_frame: bool
-    columns_per_mm: float
+    shift_px_per_mm: tuple[float, float]
 
     def mean(self, image: FloatArray) -> float:
         """Area-weighted mean of a picture's crop; nan where the window sees no pixel."""
@@ -55,8 +55,8 @@ def window_at(theta_r_deg: float, pinhole: Pinhole, width_mm: float, height_mm: 
     area = coverage.fraction * area_per_pixel_mm2(homography, columns, rows)
     total = float(area.sum())
     weights = area / pinhole.cos4(columns, rows) / total if total > 0 else area
-    # A surface 1 mm towards the camera moves sideways in the picture by sin(theta_r).
-    shift = np.sin(np.radians(theta_r_deg)) * pinhole.focal_px / pinhole.beam_length_mm
+    axis = [0.0, 0.0]
+    shift = pinhole.project(axis, theta_r_deg, 1.0) - pinhole.project(axis, theta_r_deg)
     return Window(
         coverage.crop,
         weights,
@@ -64,5 +64,5 @@ def window_at(theta_r_deg: float, pinhole: Pinhole, width_mm: float, height_mm: 
         outline,
         float(coverage.fraction.sum()),
         coverage.inside_frame,
-        float(shift),
+        (float(shift[0]), float(shift[1])),
     )

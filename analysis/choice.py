@@ -122,6 +122,8 @@ def _probability(result: FitResult) -> float:
 
 
 def _judged(chosen: FitResult, measurements: Measurements) -> tuple[str, str]:
+    if chosen.dof == 0:
+        return "not identifiable", f"{chosen.model}: as many parameters as points, nothing to test"
     adequate, reason = _adequate(chosen)
     if not adequate:
         return "none adequate", f"{reason}; worst at {_worst(chosen, measurements)}"

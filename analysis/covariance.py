@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from analysis.measurements import IntArray, Measurements
+from analysis.measurements import IntArray, Measurements, same_angle
 from instrument.geometry import FloatArray, Geometry
 
 
@@ -89,10 +89,11 @@ def shared(
 ) -> Covariance:
     """Covariance of all stated uncertainties, around models near the data (BRDF in 1/sr).
 
-    `smooth`, the best model so far, turns the independent error of theta_r into one of the BRDF:
-    the same for every model that is fitted to the data. `own` (default `smooth`) is the model that
-    is being fitted: it turns the shared errors into shifts. With another model's shifts, a large
-    enough error of the tile would pass for the structure in which the two models differ.
+    `smooth`, the best model so far, turns the error of theta_r, which a stage repeats at every
+    return to an angle, into one of the BRDF: the same for every model that is fitted. `own`
+    (default `smooth`) is the model that is being fitted: it turns the other shared errors into
+    shifts. With another model's shifts, a large enough error of the tile would pass for the
+    structure in which the two models differ.
 
     Relative errors are multiplied with a model and not with the data: scaled by noisy data, a
     common relative error pulls the fit towards the low points (Peelle's pertinent puzzle).
@@ -103,11 +104,12 @@ def shared(
         raise ValueError("u_random is not stated; allowed: a u_random in 1/sr for every point")
     f = own(m.geometry)
     groups = [
+        ("theta_r", _change(m, smooth, theta_r=m.u_theta_r_deg), same_angle(m.theta_r_deg)),
         ("theta_i, lamp setting", _change(m, own, theta_i=m.u_theta_i_deg), m.lamp_setting),
         ("dphi, lamp setting", _change(m, own, dphi=m.u_dphi_deg), m.lamp_setting),
         *((error.name, f * error.u_relative, error.group) for error in m.shared),
     ]
-    variance = np.square(m.u_random) + np.square(_change(m, smooth, theta_r=m.u_theta_r_deg))
+    variance = np.square(m.u_random)
     columns, names = [], []
     for name, shift, group in groups:
         alone, several = _columns(shift, group)

@@ -17,7 +17,7 @@ from analysis.acceptance import Acceptance, Brdf
 from analysis.averaging import Averaged, average
 from analysis.covariance import Covariance, independent, shared
 from analysis.measurements import Measurements
-from analysis.models import Model
+from analysis.models import MODELS, Model
 from analysis.problem import Problem, Solution
 from analysis.uncertainty import uncertainty
 from instrument.errors import NotDetermined
@@ -124,6 +124,25 @@ def refined(
         wider = replace(covariance, variance=covariance.variance * misfit)
         whole = _solved(first, measurements, acceptance, wider)
     return _result(measurements, whole, covariance)
+
+
+def stated_u(result: FitResult, measurements: Measurements) -> dict[str, float]:
+    """Standard uncertainties of the determined parameters, from the stated u of the data alone.
+
+    Linear, at the fitted values, without fitting again: to compare what parts of u cost. Raises
+    `ValueError` where no u is stated.
+    """
+    model = MODELS[result.model]
+    free = [i for i, p in enumerate(model.parameters) if result.u[p.name] is not None]
+
+    def smooth(geometry: Geometry) -> FloatArray:
+        return model.brdf(geometry, **result.values)
+
+    covariance = shared(measurements, smooth)
+    problem = Problem(model, measurements.geometry, measurements.brdf, covariance)
+    J = problem.jacobian(np.array([result.values[p.name] for p in model.parameters]), free)
+    u = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+    return {model.parameters[i].name: float(value) for i, value in zip(free, u, strict=True)}
 
 
 def _solved(

@@ -52,8 +52,8 @@ class Measurements:
         stated, then every other uncertainty must be 0.
     lamp_setting: points of one number share one setting of theta_i and dphi, and its errors.
     shared: further errors that points share, as those of a white tile or of the dark.
-    u_theta_i_deg, u_theta_r_deg, u_dphi_deg: of the angles, in degrees; that of theta_r is
-        independent from point to point.
+    u_theta_i_deg, u_theta_r_deg, u_dphi_deg: of the angles, in degrees; points of the same
+        theta_r share its error.
 
     Raises `ValueError` for shapes that differ, values that are not finite, angles outside their
     domain, a `u_random` that is not positive, or a negative uncertainty of an angle.
@@ -134,6 +134,11 @@ class Measurements:
     def size(self) -> int:
         """How many points there are."""
         return int(self.brdf.size)
+
+
+def same_angle(angle_deg: FloatArray) -> IntArray:
+    """A number for each point, (N,): the same for the same angle."""
+    return np.unique(angle_deg, return_inverse=True)[1].reshape(-1).astype(np.int64)
 
 
 def same_setting(theta_i_deg: FloatArray, dphi_deg: FloatArray) -> IntArray:

@@ -103,7 +103,7 @@ def _verdict(data: ReportData) -> str:
     values = []
     if chosen is not None:
         found = ((_text(p.name), _value_of(p)) for p in chosen.parameters)
-        values = [_big(*pair) for pair in (("model", _name(chosen)), *found)]
+        values = [_big(*pair) for pair in found]
     return "\n".join(
         [
             f'<section id="verdict" class="verdict {kind}">',

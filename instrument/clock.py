@@ -1,9 +1,8 @@
-"""Time, injected: the program never reads the wall clock by itself, so tests never wait for it."""
+"""Time, injected: a scan never reads the wall clock by itself, so tests never wait for it."""
 
 from __future__ import annotations
 
-import time
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Protocol
 
 
@@ -21,19 +20,3 @@ class Clock(Protocol):
     def sleep(self, seconds: float) -> None:
         """Let `seconds` pass."""
         ...
-
-
-class SystemClock:
-    """The computer's own clock."""
-
-    def now_s(self) -> float:
-        """Seconds of the monotonic clock."""
-        return time.monotonic()
-
-    def utc(self) -> datetime:
-        """The date and time, UTC."""
-        return datetime.now(UTC)
-
-    def sleep(self, seconds: float) -> None:
-        """Sleep at least `seconds`."""
-        time.sleep(max(0.0, seconds))

@@ -22,12 +22,15 @@ SweepKey = Literal["theta_i_deg", "dphi_deg", "theta_r_deg"]
 Degrees = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
 
 
+SampleSize = Annotated[float, Field(gt=0, le=500)]
+
+
 class Sample(Section):
     """The flat sample on the stage."""
 
     name: Name
-    width_mm: Positive
-    height_mm: Positive
+    width_mm: SampleSize
+    height_mm: SampleSize
 
 
 class Steps(Section):
@@ -78,19 +81,32 @@ class Window(Section):
     min_pixels: Annotated[int, Field(ge=1, le=100_000_000)] = 100
 
 
+# At 90 degrees there is nothing to see, nor light to see it by.
+ViewAngle = Annotated[float, Field(ge=-89.5, le=89.5)]
+
+
 class WhiteTile(Section):
     """The reference: a diffuser of known reflectance, measured for every place of the lamp."""
 
     reflectance: Annotated[float, Field(gt=0, le=1)]
     u_reflectance: NotNegative
-    theta_r_deg: Annotated[float, Field(ge=-90, le=90)] = 0.0
+    theta_r_deg: ViewAngle = 0.0
     frames: Annotated[int, Field(ge=1, le=10_000)] = 16
+
+    def mistakes(self) -> Iterator[tuple[str, str]]:
+        """A certificate is better than no certificate."""
+        if self.u_reflectance >= self.reflectance / 2:
+            yield (
+                "u_reflectance",
+                f"{self.u_reflectance:g}; allowed: less than half of reflectance "
+                f"{self.reflectance:g} (k = 1, absolute and not in %)",
+            )
 
 
 class DriftCheck(Section):
     """One geometry of the sample, measured again and again, to follow the lamp."""
 
-    theta_r_deg: Annotated[float, Field(ge=-90, le=90)] = 0.0
+    theta_r_deg: ViewAngle = 0.0
     every_points: Annotated[int, Field(ge=1, le=1_000_000)] = 25
 
 
@@ -117,7 +133,7 @@ class SimulatedSample(Section):
     model: Name
     parameters: dict[str, Finite]
     mottling: Annotated[float, Field(ge=0, le=0.3)] = 0.0
-    mottling_size_mm: Positive = 2.0
+    mottling_size_mm: Annotated[float, Field(ge=0.2, le=1000)] = 2.0
 
 
 class Protocol(Section):
@@ -143,7 +159,7 @@ ModelCheck = Callable[[str, dict[str, float] | None], str | None]
 Mistakes = Iterator[tuple[KeyPath, str]]
 
 _MODELS: KeyPath = ("fit", "models")
-_GEOMETRY_DEG = {"theta_i": (0.0, 90.0), "theta_r": (-90.0, 90.0)}
+_GEOMETRY_DEG = {"theta_i": (0.0, 89.5), "theta_r": (-89.5, 89.5)}
 _DEGREES: TypeAdapter[Any] = TypeAdapter(Degrees)
 _ANGLES: TypeAdapter[Any] = TypeAdapter(Angles)
 _AXIS: TypeAdapter[Any] = TypeAdapter(Axis)

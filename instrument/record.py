@@ -7,10 +7,13 @@ worked out from them afterwards, so nothing that a value came from is lost.
 
 from __future__ import annotations
 
+import fcntl
 import json
 import math
+import os
 import sqlite3
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from types import TracebackType
@@ -21,6 +24,7 @@ from instrument.errors import InputError
 
 SCHEMA_VERSION = 1
 FILE_NAME = "record.sqlite"
+LOCK_NAME = ".scanning"
 
 Kind = Literal["point", "tile", "drift"]
 
@@ -43,8 +47,8 @@ class Reading:
     `step` is its number in the plan. Angles in degrees, theta_r signed. `signal_dn` is the
     area-weighted mean of the window over all frames less the dark, cos^4 divided out; the u are
     standard uncertainties of it: `u_noise_dn` of photons and read-out, `u_quantisation_dn` of
-    rounding the frames to whole counts, `u_dark_dn` of rounding the dark (the same for all
-    readings of one exposure), `u_placement_dn` of how well the sample stands on the axis (signed:
+    rounding the frames to whole counts, `u_dark_dn` of the dark (the same for all readings
+    of one exposure), `u_placement_dn` of how well the sample stands on the axis (signed:
     one placement shifts all its readings together).
     `lamp_setting` numbers the places of the lamp, `block` the times it was set by hand.
     """
@@ -100,11 +104,12 @@ class Record:
     @classmethod
     def create(cls, folder: Path, meta: Mapping[str, str]) -> Record:
         """Start a record in `folder`, which must be absent or empty; else `InputError`."""
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise InputError(
-                f"{folder}: --out must be absent or an empty folder: name another, or leave it out"
-            )
         try:
+            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+                raise InputError(
+                    f"{folder}: --out must be absent or an empty folder: name another, or leave "
+                    "it out"
+                )
             folder.mkdir(parents=True, exist_ok=True)
             database = _connect(folder / FILE_NAME)
         except (OSError, sqlite3.Error) as error:
@@ -132,6 +137,26 @@ class Record:
                 "use the version of the program that made the run"
             )
         return record
+
+    @contextmanager
+    def claimed(self) -> Iterator[None]:
+        """Keep other processes from scanning into this run; the system lets go when we die.
+
+        Raises `InputError` that names the process which scans already.
+        """
+        with (self.folder / LOCK_NAME).open("a+") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                lock.seek(0)
+                raise InputError(
+                    f"{self.folder}: process {lock.read().strip()} is scanning into this run: "
+                    "wait for its end, or stop it"
+                ) from error
+            lock.truncate(0)
+            lock.write(str(os.getpid()))
+            lock.flush()
+            yield
 
     def __enter__(self) -> Record:
         return self

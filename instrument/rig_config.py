@@ -61,7 +61,7 @@ class HandAxis(_Axis):
 class SimulatedAxis(_Axis):
     """A simulated motor; its device reads zero_deg when the axis stands at 0.
 
-    `home_deg` is where the axis stands after homing.
+    `home_deg` is where the axis stands after homing, which takes `homing_s`.
     """
 
     driver: Literal["simulated"]
@@ -70,6 +70,7 @@ class SimulatedAxis(_Axis):
     settle_s: NotNegative
     backlash_deg: NotNegative = 0.0
     home_deg: Finite = 0.0
+    homing_s: NotNegative = 5.0
 
 
 Axis = Annotated[HandAxis | SimulatedAxis, Field(discriminator="driver")]
@@ -149,6 +150,13 @@ class Camera(Section):
             yield (
                 "black_level_dn",
                 f"{self.black_level_dn:g}; allowed: less than half of full scale, {self.max_dn} DN",
+            )
+        least = 4 * self.read_noise_electrons / self.electrons_per_dn
+        if self.black_level_dn < least:
+            yield (
+                "black_level_dn",
+                f"{self.black_level_dn:g}; allowed: at least {least:.3g}, 4 times the read noise "
+                "in counts, or darks are cut off at 0",
             )
 
     @property

@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple
 
 import yaml
@@ -96,6 +97,12 @@ class MarkedYaml:
         while path and path not in self.values:
             path = path[:-1]
         return self.values.get(path, Mark(1, 1))
+
+
+def place(file: Path, text: str, at: KeyPath) -> str:
+    """`file:line:column: path` of a value in a text that was read before."""
+    mark = read_yaml(text.encode()).mark(at)
+    return f"{file}:{mark.line}:{mark.column}: {dotted(at)}"
 
 
 def read_yaml(raw: bytes) -> MarkedYaml:

@@ -8,8 +8,6 @@ from instrument.kinematics import Trapezoid
 from instrument.rig_config import SimulatedAxis
 from sim.scene import Scene
 
-HOMING_S = 5.0  # assumed: a few seconds, as rotary stages of this size take
-
 
 class SimulatedStage:
     """One motor axis. Angles are the device's own: it reads `zero_deg` where the axis reads 0."""
@@ -28,7 +26,7 @@ class SimulatedStage:
 
     def home(self) -> None:
         """Find the reference."""
-        self._clock.sleep(HOMING_S)
+        self._clock.sleep(self._axis.homing_s)
         self._homed = True
         self._position_deg = self._to_device(self._axis.home_deg)
         self._move = self._over(0.0)

@@ -156,9 +156,10 @@ def test_the_lobe_of_a_matte_sample_is_not_determined() -> None:
 
 
 def test_a_value_on_its_bound_has_no_u() -> None:
-    m = scan("oren_nayar", 1, albedo=0.8, sigma_deg=40, acceptance=RIG)
-    found = fit(MODELS["oren_nayar+torrance_sparrow"], m, RIG)
-    assert found.values["ks"] == 0
+    model = MODELS["oren_nayar+torrance_sparrow"]
+    scans = (scan("oren_nayar", n, albedo=0.8, sigma_deg=40, acceptance=RIG) for n in range(8))
+    fits = (fit(model, m, RIG) for m in scans)
+    found = next(result for result in fits if result.values["ks"] == 0)  # half of all seeds
     assert found.u["ks"] is None
     assert found.intervals["ks"][0] == 0
     assert 0 < found.intervals["ks"][1] < 1e-3

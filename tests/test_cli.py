@@ -230,3 +230,23 @@ def test_usage_errors_exit_with_2() -> None:
     missing = gonio("run", "no_such_protocol.yaml")
     assert missing.returncode == 2
     assert "no_such_protocol.yaml" in missing.stderr
+
+
+def test_a_stopped_run_is_reported_as_unfinished(small: Path, tmp_path: Path) -> None:
+    _stop_after_some_readings(small, tmp_path / "run", signal.SIGINT)
+    done = gonio("report", tmp_path / "run")
+    assert done.returncode in (0, 5), done.stderr
+    assert "Traceback" not in done.stderr
+    assert f"gonio resume {tmp_path / 'run'}" in done.stdout + done.stderr
+
+
+def test_nothing_in_the_working_folder_is_taken_for_the_program(
+    small: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "analysis.py").write_text("raise SystemExit('not this one')")
+    command = "import sys; sys.path.pop(0); from acquisition.cli import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", command, "run", small, "--out", tmp_path / "run"],
+        cwd=tmp_path, capture_output=True, text=True, check=False, timeout=DEADLINE_S,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr

@@ -94,7 +94,7 @@ PROTOCOL_MISTAKES = {
     "too small": (
         "width_mm: 50.0",
         "width_mm: -1",
-        "3:32: sample.width_mm: -1 is too small; allowed: a number, greater than 0",
+        "3:32: sample.width_mm: -1 is too small; allowed: a number, greater than 0 and at most 500",
     ),
     "not finite": (
         "albedo: 0.8",
@@ -210,7 +210,7 @@ PROTOCOL_MISTAKES = {
     "incidence past the geometry": (
         "60.0]",
         "95.0]",
-        "5:29: sweeps[0].theta_i_deg[2]: 95 deg; allowed: 0 to 90 deg from the normal",
+        "5:29: sweeps[0].theta_i_deg[2]: 95 deg; allowed: 0 to 89.5 deg from the normal",
     ),
     "incidence past the axis": (
         "60.0]",
@@ -221,7 +221,7 @@ PROTOCOL_MISTAKES = {
     "view past the geometry": (
         "start: -80.0",
         "start: -91",
-        "7:26: sweeps[0].theta_r_deg.start: -91 deg; allowed: -90 to 90 deg from the normal",
+        "7:26: sweeps[0].theta_r_deg.start: -91 deg; allowed: -89.5 to 89.5 deg from the normal",
     ),
     "view past the axis": (
         "stop: 80.0",
@@ -251,7 +251,7 @@ PROTOCOL_MISTAKES = {
         "0.005, theta_r_deg: 10.0",
         "0.005, theta_r_deg: 95.0",
         "12:70: references.white_tile.theta_r_deg: 95.0 is too large; allowed: a number"
-        " from -90 to 90",
+        " from -89.5 to 89.5",
     ),
     "window past the sample": (
         "{width_mm: 20.0",

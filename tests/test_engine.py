@@ -17,8 +17,8 @@ from acquisition.plan import Plan, Step, make_plan
 from acquisition.reduction import reduce
 from acquisition.rig import open_devices
 from instrument.config import Loaded, load_protocol
-from instrument.devices import Frame
-from instrument.errors import DeviceError
+from instrument.devices import Frame, Request
+from instrument.errors import DeviceError, OperatorStop
 from instrument.protocol_config import DriftCheck, References, WhiteTile
 from instrument.record import FILE_NAME, Record
 
@@ -262,3 +262,44 @@ def _reduced_without_checks(loaded: Loaded, folder: Path) -> np.ndarray:
     with Record.open(folder) as record:
         readings = [r for r in record.readings() if r.kind != "drift"]
         return reduce(readings, loaded.protocol).brdf
+
+
+def test_what_was_exposed_is_accepted_before_the_operator_is_asked(
+    small: Loaded, record: Record
+) -> None:
+    devices = open_devices(small)
+
+    class Refusing:
+        """Puts the tile there, and will not change it for the sample."""
+
+        def ask(self, request: Request) -> str:
+            if request.surface == "sample":
+                raise OperatorStop("no")
+            return devices.operator.ask(request)
+
+    with pytest.raises(OperatorStop):
+        run(small, record, replace(devices, operator=Refusing()))
+    assert {r.kind for r in record.readings()} == {"tile"}
+    assert len(record.readings()) == 2
+
+
+def test_a_scan_cut_at_any_step_can_be_reduced(small: Loaded, record: Record) -> None:
+    run(small, record)
+    readings = record.readings()
+    for count in range(len(readings) + 1):
+        reduced = reduce(readings[:count], small.protocol)
+        assert len(reduced.flags) == len(reduced.points)
+        assert np.all(np.isfinite(reduced.brdf[reduced.sound]))
+
+
+def test_the_time_goes_on_after_a_resume(small: Loaded, record: Record) -> None:
+    plan = make_plan(small)
+    for first, last in ((0, 8), (8, len(plan.steps))):
+        elapsed_s = max((r.time_s for r in record.readings()), default=0.0)
+        skipped = frozenset(s.index for s in plan.steps if not first <= s.index < last)
+        devices = open_devices(small, elapsed_s)
+        engine = Engine(small.protocol, small.rig, devices, record, [].append)
+        engine.run(plan, skipped, elapsed_s)
+    times = [r.time_s for r in record.readings()]
+    assert times == sorted(times)
+    assert len(set(times)) == len(plan.steps)

@@ -123,6 +123,7 @@ def test_a_reference_that_the_lamp_hides_is_refused(demo: Loaded) -> None:
     text = str(error.value)
     assert "white_tile.theta_r_deg: 45 deg is hidden by the lamp at theta_i 45 deg" in text
     assert "drift_check.theta_r_deg: 29 deg is hidden by the lamp at theta_i 30 deg" in text
+    assert f"{demo.protocol_path}:18:70: " in text  # where the tile's angle stands
 
 
 def test_nothing_visible_is_refused(demo: Loaded) -> None:
@@ -159,7 +160,7 @@ def test_the_whole_path_is_checked_and_not_only_its_end(demo: Loaded) -> None:
 def test_the_beam_does_not_meet_the_lamp(demo: Loaded) -> None:
     lamp = _with_zone(demo.rig, camera_to_lamp_deg=2.0)
     start, end = Pose(45, 0, 30), Pose(45, 0, 60)
-    with pytest.raises(ValueError, match="keep-out zone"):
+    with pytest.raises(InputError, match="keep-out zone"):
         moves_between(start, end, lamp)
     # Out of the lamp's plane the same swing is free.
     assert moves_between(start._replace(dphi=30), end._replace(dphi=30), lamp)
@@ -190,7 +191,7 @@ def test_the_closest_approach_is_not_missed(
 
 
 def test_an_axis_without_room_for_its_backlash_is_named(demo: Loaded) -> None:
-    with pytest.raises(ValueError, match=r"theta_r would go to -88.2 deg .* limits are -88 to 88"):
+    with pytest.raises(InputError, match=r"theta_r would go to -88.2 deg .* limits are -88 to 88"):
         moves_between(Pose(30, 0, 0), Pose(30, 0, -87.7), demo.rig)
 
 
@@ -208,3 +209,34 @@ def test_exposures_come_from_one_ladder_within_the_cameras_range(demo: Loaded) -
     assert all(b / a == pytest.approx(2**0.5, rel=1e-5) for a, b in pairwise(ladder))
     assert all(longest_below(exposure, camera) == exposure for exposure in ladder)
     assert longest_below(1e-9, camera) == ladder[0]
+
+
+def test_the_lamp_is_set_once_by_hand_for_all_sweeps(by_hand: Loaded) -> None:
+    sweeps = [_sweep([30.0, 50.0], [-60.0, 0.0]), _sweep([30.0, 50.0], [60.0, 70.0])]
+    plan = make_plan(changed(by_hand, sweeps=sweeps))
+    hands = [m.angle_deg for s in plan.steps for m in s.moves if m.axis == "theta_i"]
+    assert hands == [30, 50]
+    assert len(plan.points) == 8
+
+
+def test_the_way_of_the_hand_is_checked_too(by_hand: Loaded) -> None:
+    lamp = _with_zone(by_hand.rig, camera_to_lamp_deg=8.0)
+    with pytest.raises(InputError, match="theta_i from 30 to 70 deg meets the keep-out zone"):
+        moves_between(Pose(30, 0, 60), Pose(70, 0, 60), lamp)
+    # The camera goes first where that clears the way.
+    moves = moves_between(Pose(30, 0, 60), Pose(70, 0, 80), lamp)
+    assert [m.axis for m in moves] == ["theta_r", "theta_i"]
+
+
+def test_one_line_for_each_thing_in_the_way(demo: Loaded) -> None:
+    zone = KeepOut(name="post", theta_r_deg=[10.0, 12.0])
+    with pytest.raises(InputError) as error:
+        make_plan(changed(demo, rig={"keep_out": [zone]}))
+    (problem,) = error.value.problems
+    assert problem.startswith(f"{demo.protocol_path}:9:3: sweeps: the move of theta_r from")
+    assert "other moves" in problem
+
+
+def test_a_blocked_angle_narrower_than_lamp_and_lens_counts_as_theirs(by_hand: Loaded) -> None:
+    narrow = by_hand.rig.model_copy(update={"blocked_half_angle_deg": 0.5})
+    assert hidden_below_deg(narrow) == pytest.approx(2.741, abs=1e-3)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import CONFIGS
@@ -96,6 +98,16 @@ def test_a_misplaced_sample_counts_by_the_slope_of_the_picture() -> None:
     near, on_axis = (camera.project([0.0, 0.0], 60.0, h)[0] for h in (1.0, 0.0))
     # The surface has moved to the left, so the window sees what belongs further right.
     assert signal.u_placement_dn == pytest.approx(2 * (on_axis - near), rel=0.01)
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 45.0, 90.0, -120.0])
+def test_the_shift_of_a_misplaced_sample_turns_with_the_camera(roll_deg: float) -> None:
+    camera = replace(Pinhole.of(RIG), roll_deg=roll_deg)
+    columns, rows = window_at(60.0, camera, 20.0, 20.0).shift_px_per_mm
+    # 640 pixels for 72 mm, seen at sin 60; against the columns at no roll.
+    shift = 640 / 72 * np.sin(np.radians(60.0))
+    assert np.hypot(columns, rows) == pytest.approx(shift, rel=2e-3)
+    assert np.degrees(np.arctan2(-rows, -columns)) == pytest.approx(roll_deg, abs=0.5)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from pathlib import Path
 
@@ -81,3 +82,13 @@ def test_no_record_a_foreign_file_and_another_version_are_named(tmp_path: Path) 
         record.set_meta("schema_version", "99")
     with pytest.raises(InputError, match="schema version 99; this program reads 1"):
         Record.open(tmp_path / "run")
+
+
+def test_one_process_at_a_time_scans_into_a_run(tmp_path: Path) -> None:
+    with Record.create(tmp_path / "run", {}) as record:
+        with record.claimed(), Record.open(tmp_path / "run") as other:
+            words = rf"process {os.getpid()} is scanning into this run"
+            with pytest.raises(InputError, match=words), other.claimed():
+                raise AssertionError("claimed twice")
+        with record.claimed() as again:
+            assert again is None
