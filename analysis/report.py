@@ -157,7 +157,7 @@ def _charts(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
             _figure(
                 [charts.polar_chart(sweeps, quantity)],
                 f"{quantity}, polar",
-                _polar_words(data, quantity),
+                _polar_words(data, sweeps, quantity),
             ),
         ]
     )
@@ -172,9 +172,11 @@ def _figure(drawings: list[str], label: str, caption: str) -> str:
 def _shape_words(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
     words = [
         "Radiance divided by its value straight above the sample (θᵣ = 0), against the view "
-        "angle. Positive θᵣ is the lamp’s side; ▼ marks the lamp’s direction, θᵣ = θᵢ. "
-        "Bars: standard uncertainty u (k = 1), often smaller than the dots.",
+        "angle. Positive θᵣ is the lamp’s side. Bars: standard uncertainty u (k = 1), often "
+        "smaller than the dots.",
     ]
+    if any(s.in_plane for s in sweeps):
+        words.append("▼ marks the lamp’s direction, θᵣ = θᵢ.")
     if any(not s.in_plane for s in sweeps):
         words.append("Δφ is the azimuth of positive θᵣ, counted from the lamp’s.")
     if data.drawn:
@@ -208,15 +210,18 @@ def _panel_words(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
         drawn = [f"{'; '.join(drawn)}{_scaled(data)}."]
     if len(sweeps) > charts.MOST_PANELS:
         drawn.append(f"{charts.MOST_PANELS} of {len(sweeps)} sweeps are shown.")
+    if data.drawn and data.drawn[0].residuals is not None:
+        drawn.append("Dots may stand off a line together by an error that they share.")
     return " ".join(["Bars: u (k = 1).", *drawn, _mark_words(data)])
 
 
-def _polar_words(data: ReportData, quantity: str) -> str:
+def _polar_words(data: ReportData, sweeps: tuple[Sweep, ...], quantity: str) -> str:
     words = (
         f"The distance from the sample is the {quantity}, the direction is the camera’s: straight "
-        "up is θᵣ = 0, to the right is the lamp’s side. Arrows come from the lamp. A matte "
-        "(Lambertian) sample would give a half circle."
+        "up is θᵣ = 0, to the right is the lamp’s side. A matte (Lambertian) sample would give a "
+        "half circle."
     )
+    words += " Arrows come from the lamp." if any(s.in_plane for s in sweeps) else ""
     return words + (" Flagged points are left out." if data.flagged.any() else "")
 
 
@@ -229,7 +234,8 @@ def _candidates(data: ReportData) -> str:
         ("Model", "Parameters ± u (k = 1)", "#Residual, rms", "#Reduced χ²", "#ΔBIC"),
         cell="th",
     )
-    rows = "".join(_candidate(c, best) for c in data.ranked)
+    word = "✔ chosen" if data.verdict_kind == "adequate" else "best of these"
+    rows = "".join(_candidate(c, best, word) for c in data.ranked)
     return (
         '<h2 id="candidates">Models compared</h2>\n'
         f'<div class="wide"><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>\n'
@@ -239,11 +245,11 @@ def _candidates(data: ReportData) -> str:
     )
 
 
-def _candidate(candidate: Candidate, best_bic: float | None) -> str:
+def _candidate(candidate: Candidate, best_bic: float | None, word: str) -> str:
     above = math.nan
     if candidate.bic is not None and best_bic is not None:
         above = candidate.bic - best_bic
-    tag = '<br><span class="tag">✔ chosen</span>' if candidate.chosen else ""
+    tag = f'<br><span class="tag">{word}</span>' if candidate.chosen else ""
     if not candidate.converged:
         tag += f'<br><span class="soft">did not converge: {_text(candidate.message)}</span>'
     parameters = "".join(

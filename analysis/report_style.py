@@ -179,7 +179,7 @@ body { overflow-wrap: break-word; }
 @media print {
   @page { margin: 14mm; }
   body { max-width: none; padding: 0; font-size: 11pt; }
-  h2 { break-after: avoid; }
+  h2, h3 { break-after: avoid; }
   .verdict, figure, tr, .attention { break-inside: avoid; }
   .verdict, .verdict.adequate, .verdict.warning, tr.chosen td { background: #fff;
     border-color: #000; }

@@ -15,13 +15,15 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from analysis.acceptance import Acceptance, needed_rings, radiance
+from analysis.acceptance import Acceptance, radiance, rings_each
 from instrument.coverage import Coverage, polygon_coverage
 from instrument.geometry import FloatArray
 from instrument.pinhole import Pinhole, apply_homography, rectangle_mm
 from sim.scene import Scene
 
 NODES = 9  # a side; the interpolation error then stays below 1e-5 of the radiance (see the tests)
+
+_VIEWS = np.arange(-89.0, 90.0)
 
 FloatImage = NDArray[np.float32]
 
@@ -47,19 +49,6 @@ def electrons_per_s(scene: Scene) -> FloatImage:
         picture[crop] += covered * (_surface(scene, view) - picture[crop])
     picture *= _response(Pinhole.of(rig), rig.lamp.white_electrons_per_s)
     return picture
-
-
-def acceptance_of(scene: Scene) -> Acceptance:
-    """Distances and solid angles of the rig, and the patch that counts."""
-    rig, window = scene.rig, scene.protocol.window
-    return Acceptance(
-        rig.beam_length_mm,
-        rig.lamp_distance_mm,
-        rig.source_solid_angle_sr,
-        rig.receiver_solid_angle_sr,
-        window.width_mm,
-        window.height_mm,
-    )
 
 
 def _view(scene: Scene) -> View:
@@ -105,14 +94,26 @@ def _radiance_at(scene: Scene, points_mm: FloatArray) -> FloatArray:
     """Radiance at points (..., 2) of the surface, seen from the lens."""
     height = np.full(points_mm.shape[:-1], scene.rig.simulation.sample_height_mm)
     flat = np.dstack([points_mm, height]).reshape(-1, 3)
-    acceptance, brdf = acceptance_of(scene), scene.brdf()
-    angles = (
-        np.array([scene.true_deg["theta_i"]]),
-        np.array([scene.true_deg["theta_r"]]),
-        np.array([scene.true_deg["dphi"]]),
-    )
-    rings = needed_rings(brdf, *angles, acceptance)
-    return radiance(brdf, flat, *angles, acceptance, rings).reshape(points_mm.shape[:-1])
+    angles = (scene.true_deg["theta_i"], scene.true_deg["theta_r"], scene.true_deg["dphi"])
+    values = radiance(scene.brdf(), flat, *angles, _acceptance(scene), _rings(scene))
+    return values.reshape(points_mm.shape[:-1])
+
+
+def _acceptance(scene: Scene) -> Acceptance:
+    return Acceptance.of(scene.rig, scene.protocol.window)
+
+
+def _rings(scene: Scene) -> int:
+    """How finely lamp and lens must be averaged: worked out once for every place of the lamp.
+
+    The most of what the whole degrees about the view angle need.
+    """
+    theta_i, dphi = scene.true_deg["theta_i"], scene.true_deg["dphi"]
+    key = (scene.surface, theta_i, dphi)
+    if key not in scene.rings:
+        scene.rings[key] = rings_each(scene.brdf(), theta_i, _VIEWS, dphi, _acceptance(scene))
+    near = np.abs(_VIEWS - scene.true_deg["theta_r"]) <= 1.0
+    return int(scene.rings[key][near].max(initial=1))
 
 
 def _texture(scene: Scene, view: View) -> FloatImage:

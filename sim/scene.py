@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.models import MODELS
 from instrument.devices import Surface
@@ -40,6 +41,7 @@ class Scene:
     lit: bool = True
     step: int = 0
     true_deg: dict[str, float] = field(default_factory=dict)
+    rings: dict[tuple[str, float, float], NDArray[np.int64]] = field(default_factory=dict)
     _texture: FloatArray | None = None
 
     def random(self, *key: int) -> np.random.Generator:
