@@ -175,6 +175,7 @@ def _reading(exposed: Exposed, window: Window, signal: Signal) -> Reading:
         u_quantisation_dn=signal.u_quantisation_dn,
         u_dark_dn=signal.u_dark_dn,
         u_placement_dn=signal.u_placement_dn,
+        u_texture_dn=signal.u_texture_dn,
         exposure_s=first.exposure_s,
         frames=len(exposed.frames),
         window_pixels=window.pixels,

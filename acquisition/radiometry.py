@@ -30,7 +30,8 @@ class Dark:
 class Signal:
     """What a window gave, in counts (DN); the u are standard uncertainties of `signal_dn`.
 
-    `u_placement_dn` has the sign of the change for a sample that stands too near the camera.
+    `u_placement_dn` has the sign of the change for a sample that stands too near the camera;
+    `u_texture_dn` is what a straight line leaves of it.
     """
 
     signal_dn: float
@@ -38,6 +39,7 @@ class Signal:
     u_quantisation_dn: float
     u_dark_dn: float
     u_placement_dn: float
+    u_texture_dn: float
     saturated_pixels: int
     peak_dn: float
     flags: str
@@ -75,7 +77,7 @@ def measure(
         _noise(window, variance / len(frames)),
         _rounding(window, mean, camera),
         float(np.hypot(dark_noise, _rounding(window, dark.mean[window.crop], camera))),
-        u_placement_mm * _change_per_mm(frames, dark, window),
+        *_placement(frames, dark, window, u_placement_mm),
         saturated,
         peak,
         _flags(window, min_pixels, saturated, peak, camera),
@@ -133,34 +135,36 @@ def rounding_u_dn(noise_variance_dn2: float) -> float:
     return float(np.sqrt(damped.sum()))
 
 
-def _change_per_mm(frames: Sequence[Frame], dark: Dark, window: Window) -> float:
-    """How the window's mean changes when the surface stands 1 mm nearer to the camera, DN per mm.
+def _placement(
+    frames: Sequence[Frame], dark: Dark, window: Window, u_mm: float
+) -> tuple[float, float]:
+    """What a surface u_mm nearer to the camera does to the window's mean, DN: linear, and the rest.
 
-    The surface then appears shifted, and the window sees what belongs on the other side.
+    The surface then appears shifted, and the window sees what belongs on the other side. The
+    picture itself, moved by as much, says how much that changes, and how little of it is linear.
     """
-    columns, rows = window.shift_px_per_mm
-    across = _slope(frames, dark, window, (0, 1)) * columns
-    return -(across + _slope(frames, dark, window, (1, 0)) * rows)
-
-
-def _slope(frames: Sequence[Frame], dark: Dark, window: Window, step: tuple[int, int]) -> float:
-    """Change of the window's mean when the window moves by `step` (rows, columns), DN."""
-    ahead, behind = (_moved(window.crop, by, step) for by in (1, -1))
-    inside = all(s.start >= 0 for s in behind) and all(
-        s.stop <= size for s, size in zip(ahead, dark.mean.shape, strict=True)
+    shift = np.array(window.shift_px_per_mm[::-1]) * u_mm  # rows, columns
+    whole = np.rint(shift).astype(int)
+    if not whole.any():
+        whole[np.argmax(np.abs(shift))] = 1 if shift[np.argmax(np.abs(shift))] >= 0 else -1
+    ahead, behind = (_moved(window.crop, by * whole) for by in (1, -1))
+    inside = all(
+        s.start >= 0 and s.stop <= size
+        for crop in (ahead, behind)
+        for s, size in zip(crop, dark.mean.shape, strict=True)
     )
-    if not window.inside_frame or not inside:
-        return 0.0
-    image = frames[0].image  # one frame is enough for a part of the uncertainty
-    change = image[ahead].astype(np.float64) - image[behind]
-    change -= dark.mean[ahead] - dark.mean[behind]
-    return window.mean(change) / 2
-
-
-def _moved(crop: tuple[slice, slice], by: int, step: tuple[int, int]) -> tuple[slice, slice]:
-    rows, columns = (
-        slice(s.start + by * n, s.stop + by * n) for s, n in zip(crop, step, strict=True)
+    if not u_mm or not window.inside_frame or not inside:
+        return 0.0, 0.0
+    part = float(np.linalg.norm(shift) / np.linalg.norm(whole))
+    before, here, after = (
+        window.mean(frames[0].image[crop] - dark.mean[crop])
+        for crop in (behind, window.crop, ahead)
     )
+    return -part * (after - before) / 2, part**2 * np.sqrt(3) * abs(after + before - 2 * here) / 2
+
+
+def _moved(crop: tuple[slice, slice], by: NDArray[np.int64]) -> tuple[slice, slice]:
+    rows, columns = (slice(s.start + n, s.stop + n) for s, n in zip(crop, by.tolist(), strict=True))
     return rows, columns
 
 

@@ -20,7 +20,7 @@ from instrument.protocol_config import Protocol
 from instrument.record import Reading
 
 NOISE, ROUNDING, DRIFT = "photon and read noise", "rounding to counts", "lamp drift"
-DARK, PLACEMENT = "dark frames", "sample placement"
+DARK, PLACEMENT, TEXTURE = "dark frames", "sample placement", "texture at the window edge"
 NO_TILE_YET, NO_SIGNAL = "no white tile yet", "no signal"
 TILE_READING, TILE = "white tile reading", "white tile certificate"
 
@@ -126,6 +126,7 @@ def _components(points: Sequence[Reading]) -> dict[str, FloatArray]:
     return {
         NOISE: np.abs(_relative(points, "u_noise_dn")),
         ROUNDING: np.abs(_relative(points, "u_quantisation_dn")),
+        TEXTURE: np.abs(_relative(points, "u_texture_dn")),
     }
 
 

@@ -15,6 +15,8 @@ import numpy as np
 from analysis.measurements import IntArray, Measurements, same_angle
 from instrument.geometry import FloatArray, Geometry
 
+Brdf = Callable[[Geometry], FloatArray]
+
 
 @dataclass(frozen=True, slots=True)
 class Covariance:
@@ -84,8 +86,8 @@ def independent(measurements: Measurements) -> Covariance:
 
 def shared(
     measurements: Measurements,
-    smooth: Callable[[Geometry], FloatArray],
-    own: Callable[[Geometry], FloatArray] | None = None,
+    smooth: Brdf,
+    own: Brdf | None = None,
 ) -> Covariance:
     """Covariance of all stated uncertainties, around models near the data (BRDF in 1/sr).
 
@@ -103,13 +105,19 @@ def shared(
     if m.u_random is None:
         raise ValueError("u_random is not stated; allowed: a u_random in 1/sr for every point")
     f = own(m.geometry)
+    view, incidence, azimuth = (
+        {"theta_r": m.u_theta_r_deg},
+        {"theta_i": m.u_theta_i_deg},
+        {"dphi": m.u_dphi_deg},
+    )
     groups = [
-        ("theta_r", _change(m, smooth, theta_r=m.u_theta_r_deg), same_angle(m.theta_r_deg)),
-        ("theta_i, lamp setting", _change(m, own, theta_i=m.u_theta_i_deg), m.lamp_setting),
-        ("dphi, lamp setting", _change(m, own, dphi=m.u_dphi_deg), m.lamp_setting),
+        ("theta_r", _change(m, smooth, **view), same_angle(m.theta_r_deg)),
+        ("theta_i, lamp setting", _change(m, own, **incidence), m.lamp_setting),
+        ("dphi, lamp setting", _change(m, own, **azimuth), m.lamp_setting),
         *((error.name, f * error.u_relative, error.group) for error in m.shared),
     ]
-    variance = np.square(m.u_random)
+    bends = [_bend(m, smooth, **angle) for angle in (view, incidence, azimuth)]
+    variance = np.square(m.u_random) + np.sum(np.square(bends), axis=0)
     columns, names = [], []
     for name, shift, group in groups:
         alone, several = _columns(shift, group)
@@ -132,33 +140,39 @@ def _columns(shift: FloatArray, group: IntArray) -> tuple[FloatArray, FloatArray
     )
 
 
-def _change(
-    m: Measurements,
-    smooth: Callable[[Geometry], FloatArray],
-    theta_i: float = 0.0,
-    theta_r: float = 0.0,
-    dphi: float = 0.0,
-) -> FloatArray:
+def _change(m: Measurements, smooth: Brdf, **angle: float) -> FloatArray:
     """Half the change of the model from -u to +u of an angle (degrees), (N,): (df/dx) u.
 
     Steps of u itself, so that a kink counts as far as u reaches over it. Beyond 90 degrees there
     is no geometry: there the change on the other side counts alone.
     """
-    if theta_i == theta_r == dphi == 0:
+    if not any(angle.values()):
         return np.zeros(m.size)
-    up, up_step = _moved(m, theta_i, theta_r, dphi)
-    down, down_step = _moved(m, -theta_i, -theta_r, -dphi)
+    up, up_step = _moved(m, 1, **angle)
+    down, down_step = _moved(m, -1, **angle)
     return np.asarray((smooth(up) - smooth(down)) / (up_step + down_step))
 
 
+def _bend(m: Measurements, smooth: Brdf, **angle: float) -> FloatArray:
+    """What a straight line leaves of an angle's error, (N,): its u by the next term of the series.
+
+    A normal error of u adds (d2f/dx2) u^2 / 2 times a square of mean square 3 (GUM, 5.1.2, note).
+    """
+    if not any(angle.values()):
+        return np.zeros(m.size)
+    (up, up_step), (down, down_step) = _moved(m, 1, **angle), _moved(m, -1, **angle)
+    both = up_step * down_step  # beyond 90 degrees there is no second side to compare with
+    return np.asarray(both * np.sqrt(3) * (smooth(up) + smooth(down) - 2 * smooth(m.geometry)) / 2)
+
+
 def _moved(
-    m: Measurements, theta_i: float, theta_r: float, dphi: float
+    m: Measurements, sign: int, *, theta_i: float = 0.0, theta_r: float = 0.0, dphi: float = 0.0
 ) -> tuple[Geometry, FloatArray]:
     """Geometry with the angles moved, and 1 where that could be done, 0 where not."""
-    new_i, new_r = m.theta_i_deg + theta_i, m.theta_r_deg + theta_r
+    new_i, new_r = m.theta_i_deg + sign * theta_i, m.theta_r_deg + sign * theta_r
     inside = (np.abs(new_i) <= 90) & (np.abs(new_r) <= 90)
     new_i, new_r = np.where(inside, new_i, m.theta_i_deg), np.where(inside, new_r, m.theta_r_deg)
     # A lamp that passes the normal stands on the other side: dphi turns by 180.
-    new_dphi = m.dphi_deg + dphi + np.where(new_i < 0, 180.0, 0.0)
+    new_dphi = m.dphi_deg + sign * dphi + np.where(new_i < 0, 180.0, 0.0)
     moved = Geometry.from_degrees(theta_i=np.abs(new_i), theta_r=new_r, dphi=new_dphi)
     return moved, inside.astype(np.float64)

@@ -49,7 +49,7 @@ class Reading:
     standard uncertainties of it: `u_noise_dn` of photons and read-out, `u_quantisation_dn` of
     rounding the frames to whole counts, `u_dark_dn` of the dark (the same for all readings
     of one exposure), `u_placement_dn` of how well the sample stands on the axis (signed:
-    one placement shifts all its readings together).
+    one placement shifts all its readings together) and `u_texture_dn` of what that leaves out.
     `lamp_setting` numbers the places of the lamp, `block` the times it was set by hand.
     """
 
@@ -66,6 +66,7 @@ class Reading:
     u_quantisation_dn: float
     u_dark_dn: float
     u_placement_dn: float
+    u_texture_dn: float
     exposure_s: float
     frames: int
     window_pixels: float

@@ -17,6 +17,7 @@ def reading(step: int = 0, **changes: object) -> Reading:
         "step": step, "kind": "point", "surface": "sample", "theta_i_deg": 30.0, "dphi_deg": 0.0,
         "theta_r_deg": -20.0, "lamp_setting": 0, "block": 0, "signal_dn": 2000.5,
         "u_noise_dn": 0.1, "u_quantisation_dn": 0.01, "u_dark_dn": 0.02, "u_placement_dn": -0.4,
+        "u_texture_dn": 0.1,
         "exposure_s": 0.032, "frames": 4, "window_pixels": 31000.25, "saturated_pixels": 0,
         "peak_dn": 2500.0, "time_s": 12.5, "time_utc": "2026-01-01T00:00:00+00:00", "flags": "",
     }  # fmt: skip
