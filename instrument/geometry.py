@@ -23,6 +23,7 @@ stands at azimuth -dphi, so that phi_r - phi_i = dphi.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,6 +75,13 @@ class Geometry:
             np.degrees(np.arctan2(v_xy, to_camera[..., 2])),
             np.mod(np.degrees(dphi), 360.0),
         )
+
+    def blocks(self, size: int) -> Iterator[tuple[slice, Geometry]]:
+        """The geometries one after the other, `size` at a time, each with its place among them."""
+        flat = [a.reshape(-1) for a in (self.theta_i_deg, self.theta_r_deg, self.dphi_deg)]
+        for start in range(0, flat[0].size, size):
+            part = slice(start, start + size)
+            yield part, Geometry(*(a[part] for a in flat))
 
     @property
     def shape(self) -> tuple[int, ...]:
