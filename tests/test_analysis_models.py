@@ -29,7 +29,8 @@ def inside(model: Model, part: float) -> dict[str, float]:
     }
 
 
-@pytest.mark.parametrize("name", NAMES)
+# Wolff's is not: 1998 (8) has the view angle in K; how far off it is, its own tests say.
+@pytest.mark.parametrize("name", [n for n in NAMES if n != "wolff"])
 @given(theta_i=ANGLE, theta_r=ANGLE, dphi=AZIMUTH, part=PART)
 def test_reciprocal(name: str, theta_i: float, theta_r: float, dphi: float, part: float) -> None:
     model = MODELS[name]

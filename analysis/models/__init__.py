@@ -10,12 +10,34 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 
 from analysis.models.base import Model, Parameter, add
+from analysis.models.beckmann_spizzichino import BECKMANN_SPIZZICHINO
 from analysis.models.diffuse import LAMBERT, OREN_NAYAR, OREN_NAYAR_QUALITATIVE
-from analysis.models.specular import TORRANCE_SPARROW
+from analysis.models.eon import EON
+from analysis.models.ggx import GGX
+from analysis.models.minnaert import MINNAERT
+from analysis.models.oren_nayar_exact import OREN_NAYAR_EXACT
+from analysis.models.specular import TORRANCE_SPARROW, TORRANCE_SPARROW_LOBE
+from analysis.models.unified import UNIFIED
+from analysis.models.wolff import WOLFF, WOLFF_OREN_NAYAR
 
 __all__ = ["MODELS", "Model", "Parameter"]
 
-_SINGLE = {m.name: m for m in (LAMBERT, OREN_NAYAR_QUALITATIVE, OREN_NAYAR, TORRANCE_SPARROW)}
+_ALL = (
+    LAMBERT,
+    MINNAERT,
+    OREN_NAYAR_QUALITATIVE,
+    OREN_NAYAR,
+    OREN_NAYAR_EXACT,
+    EON,
+    WOLFF,
+    WOLFF_OREN_NAYAR,
+    TORRANCE_SPARROW,
+    TORRANCE_SPARROW_LOBE,
+    BECKMANN_SPIZZICHINO,
+    UNIFIED,
+    GGX,
+)
+_SINGLE = {m.name: m for m in _ALL}
 
 
 class _Models(Mapping[str, Model]):
