@@ -7,7 +7,6 @@ scan ends in any other way its input closes, and it ends without having touched 
 
 from __future__ import annotations
 
-import importlib
 import signal
 import subprocess
 import sys
@@ -16,7 +15,7 @@ from types import TracebackType
 
 from instrument.errors import GonioError
 
-GO = "go\n"
+GO = "go\n"  # the word that the record is complete
 
 
 class Afterwards:
@@ -25,7 +24,7 @@ class Afterwards:
     def __init__(self, folder: Path, as_json: bool) -> None:
         form = "json" if as_json else "text"
         # -P: nothing in the folder that one happens to stand in is taken for the program.
-        command = [sys.executable, "-P", "-m", "acquisition.afterwards", str(folder), form]
+        command = [sys.executable, "-P", "-m", "acquisition.finisher", str(folder), form]
         # A session of its own: Ctrl-C is the scan's business.
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, text=True, start_new_session=True
@@ -58,22 +57,3 @@ class Afterwards:
                 f"{self._folder}: the record is complete, but fit and report have failed: "
                 f"gonio report {self._folder}"
             )
-
-
-def main() -> None:
-    """The other side: load, wait for the word, finish the run."""
-    from acquisition.run import report_run
-
-    for name in ("acquisition.results", "matplotlib.figure", "matplotlib.backends.backend_svg"):
-        importlib.import_module(name)
-    if sys.stdin.readline() != GO:
-        return
-    try:
-        report_run(Path(sys.argv[1]), sys.argv[2] == "json")
-    except (GonioError, OSError) as error:
-        sys.stderr.write(f"{error}\n")
-        sys.exit(1)
-
-
-if __name__ == "__main__":
-    main()

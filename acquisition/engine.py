@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from acquisition.axis import Axis
 from acquisition.exposing import Exposed, Exposer
@@ -170,18 +170,10 @@ def _reading(exposed: Exposed, window: Window, signal: Signal) -> Reading:
         theta_r_deg=step.pose.theta_r,
         lamp_setting=step.lamp_setting,
         block=step.block,
-        signal_dn=signal.signal_dn,
-        u_noise_dn=signal.u_noise_dn,
-        u_quantisation_dn=signal.u_quantisation_dn,
-        u_dark_dn=signal.u_dark_dn,
-        u_placement_dn=signal.u_placement_dn,
-        u_texture_dn=signal.u_texture_dn,
         exposure_s=first.exposure_s,
         frames=len(exposed.frames),
         window_pixels=window.pixels,
-        saturated_pixels=signal.saturated_pixels,
-        peak_dn=signal.peak_dn,
         time_s=exposed.time_s,
         time_utc=exposed.time_utc,
-        flags=signal.flags,
+        **asdict(signal),
     )

@@ -75,8 +75,8 @@ def measure(
     return Signal(
         window.mean(mean - dark.mean[window.crop]),
         _noise(window, variance / len(frames)),
-        _rounding(window, mean, camera),
-        float(np.hypot(dark_noise, _rounding(window, dark.mean[window.crop], camera))),
+        _rounding(window.mean(mean), camera),
+        float(np.hypot(dark_noise, _rounding(window.mean(dark.mean[window.crop]), camera))),
         *_placement(frames, dark, window, u_placement_mm),
         saturated,
         peak,
@@ -107,12 +107,12 @@ def _noise(window: Window, variance: FloatArray) -> float:
     return float(np.sqrt(np.sum(window.weights**2 * variance)))
 
 
-def _rounding(window: Window, mean: FloatArray, camera: Camera) -> float:
-    """Standard uncertainty that rounding to whole counts leaves in the window's mean, DN.
+def _rounding(level_dn: float, camera: Camera) -> float:
+    """Standard uncertainty that rounding to whole counts leaves in a mean of that level, DN.
 
     The noise that dithers it is the rig file's: that of the counts contains the rounding itself.
     """
-    return rounding_u_dn(window.mean(_photon_transfer(mean, camera)))
+    return rounding_u_dn(float(_photon_transfer(np.asarray(level_dn), camera)))
 
 
 def _photon_transfer(mean: FloatArray, camera: Camera) -> FloatArray:

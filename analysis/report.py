@@ -8,7 +8,6 @@ from __future__ import annotations
 import base64
 import html
 import math
-import os
 import struct
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,6 +15,7 @@ from pathlib import Path
 from analysis import charts
 from analysis.report_data import Candidate, Parameter, ReportData, Rows, Sweep, sweeps_of
 from analysis.report_style import CSS, format_value
+from instrument.files import write_whole
 from instrument.record import Preview
 
 _STATES = {
@@ -32,13 +32,7 @@ _PNG_HEADER = struct.Struct(">8s4x4sII")
 
 def write_report(path: Path, data: ReportData) -> None:
     """Write the report; a reader of `path` sees the old file or the whole new one, never a part."""
-    page = report_html(data).encode("utf-8", errors="replace")
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(page)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    write_whole(path, report_html(data))
 
 
 def report_html(data: ReportData) -> str:

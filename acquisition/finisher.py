@@ -1,0 +1,30 @@
+"""The waiting process of `acquisition.afterwards`: load, wait for the word, finish the run."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+
+from acquisition.afterwards import GO
+from acquisition.run import report_run
+from instrument.errors import GonioError
+
+NEEDED = ("acquisition.results", "matplotlib.figure", "matplotlib.backends.backend_svg")
+
+
+def main() -> None:
+    """Arguments: the run's folder, and `json` or `text`; ends at once when its input closes."""
+    for name in NEEDED:
+        importlib.import_module(name)
+    if sys.stdin.readline() != GO:
+        return
+    try:
+        report_run(Path(sys.argv[1]), sys.argv[2] == "json")
+    except (GonioError, OSError) as error:
+        sys.stderr.write(f"{error}\n")
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()
