@@ -145,7 +145,7 @@ def _adequate(chosen: FitResult) -> tuple[bool, str]:
     probability = _probability(chosen)
     words = (
         f"{chosen.model}: chi2 {chosen.chi2:.4g} for {chosen.dof} degrees of freedom, "
-        f"probability {probability:.2g}, allowed {UNLIKELY:g} or more"
+        f"p = {probability:.2g} (rejected below {UNLIKELY:g})"
     )
     return probability > UNLIKELY, words
 

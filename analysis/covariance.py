@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from analysis.measurements import IntArray, Measurements, same_angle
+from analysis.measurements import IntArray, Measurements
 from instrument.geometry import FloatArray, Geometry
 
 Brdf = Callable[[Geometry], FloatArray]
@@ -110,8 +110,8 @@ def shared(
         {"theta_i": m.u_theta_i_deg},
         {"dphi": m.u_dphi_deg},
     )
-    groups = [
-        ("theta_r", _change(m, smooth, **view), same_angle(m.theta_r_deg)),
+    groups: list[tuple[str, FloatArray, IntArray | FloatArray]] = [
+        ("theta_r", _change(m, smooth, **view), m.theta_r_deg),
         ("theta_i, lamp setting", _change(m, own, **incidence), m.lamp_setting),
         ("dphi, lamp setting", _change(m, own, **azimuth), m.lamp_setting),
         *((error.name, f * error.u_relative, error.group) for error in m.shared),
@@ -120,24 +120,41 @@ def shared(
     variance = np.square(m.u_random) + np.sum(np.square(bends), axis=0)
     columns, names = [], []
     for name, shift, group in groups:
-        alone, several = _columns(shift, group)
+        alone, several, labels = _columns(shift, group)
         variance = variance + np.square(alone)
         columns.append(several)
-        count = several.shape[1]
-        names += [name] if count == 1 else [f"{name} {n + 1}" for n in range(count)]
-    return Covariance(variance, np.concatenate(columns, axis=1), tuple(names))
+        names += [f"{name}{label}" for label in labels]
+    return Covariance(variance, np.concatenate(columns, axis=1), _told_apart(names))
 
 
-def _columns(shift: FloatArray, group: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Shifts (N,) of points that share theirs with none, and a column for every other group."""
-    _, member, count = np.unique(group, return_inverse=True, return_counts=True)
+def _columns(
+    shift: FloatArray, group: IntArray | FloatArray
+) -> tuple[FloatArray, FloatArray, list[str]]:
+    """Shifts (N,) of points that share theirs with none; a column and a label a larger group.
+
+    The points of a group have the same number in `group`, or the same angle in degrees.
+    """
+    values, member, count = np.unique(group, return_inverse=True, return_counts=True)
     alone = count[member] == 1
     if not np.any(shift):
-        return np.zeros_like(shift), np.zeros((shift.size, 0))
+        return np.zeros_like(shift), np.zeros((shift.size, 0)), []
     several = np.flatnonzero(count > 1)
-    return np.where(alone, shift, 0.0), np.where(
-        member[:, np.newaxis] == several, shift[:, np.newaxis], 0.0
-    )
+    columns = np.where(member[:, np.newaxis] == several, shift[:, np.newaxis], 0.0)
+    if np.issubdtype(group.dtype, np.floating):
+        labels = [f" at {value:g} degrees" for value in values[several]]
+    else:
+        labels = [f" {n + 1}" for n in range(several.size)] if several.size > 1 else [""]
+    return np.where(alone, shift, 0.0), columns, labels[: several.size]
+
+
+def _told_apart(names: list[str]) -> tuple[str, ...]:
+    """Names that stand several times get a number each."""
+    seen: dict[str, int] = {}
+    apart = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        apart.append(name if names.count(name) == 1 else f"{name} {seen[name]}")
+    return tuple(apart)
 
 
 def _change(m: Measurements, smooth: Brdf, **angle: float) -> FloatArray:

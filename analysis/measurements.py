@@ -136,11 +136,6 @@ class Measurements:
         return int(self.brdf.size)
 
 
-def same_angle(angle_deg: FloatArray) -> IntArray:
-    """A number for each point, (N,): the same for the same angle."""
-    return np.unique(angle_deg, return_inverse=True)[1].reshape(-1).astype(np.int64)
-
-
 def same_setting(theta_i_deg: FloatArray, dphi_deg: FloatArray) -> IntArray:
     """A number for each point, (N,): the same for the same theta_i and dphi."""
     pairs = np.stack([theta_i_deg, dphi_deg], axis=-1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.acceptance import Acceptance, averaged_brdf
-from analysis.measurements import Measurements, SharedError, same_angle, same_setting
+from analysis.measurements import Measurements, SharedError, same_setting
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
 
@@ -39,7 +39,8 @@ def scan(
     theta_i, theta_r, dphi = scan_angles()
     setting = same_setting(theta_i, dphi)
     true_i = theta_i + u_deg * rng.normal(size=3)[setting]
-    view = same_angle(theta_r)  # a stage repeats its error at every return to an angle
+    # A stage repeats its error at every return to an angle.
+    view = np.unique(theta_r, return_inverse=True)[1]
     true_r = theta_r + u_deg * rng.normal(size=int(view.max()) + 1)[view]
     true_phi = dphi + u_deg * rng.normal(size=3)[setting]
 
