@@ -50,8 +50,7 @@ def run_protocol(
 def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
     """Go on with a stopped run; a finished one is fitted and reported again."""
     with Record.open(folder) as record:
-        loaded = _as_used(folder)
-        _same_files(record, loaded)
+        loaded = _as_used(record)
         plan = make_plan(loaded)
         done = frozenset(reading.step for reading in record.readings())
         missing = [step for step in plan.steps if step.index not in done]
@@ -65,9 +64,7 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
 def report_run(folder: Path, as_json: bool) -> None:
     """Fit a run again and write its tables and report anew; touches no device."""
     with Record.open(folder) as record:
-        loaded = _as_used(folder)
-        _same_files(record, loaded)
-        _finish(record, loaded, as_json)
+        _finish(record, _as_used(record), as_json)
 
 
 def show_plan(protocol_path: Path, rig_path: Path | None, as_json: bool) -> None:
@@ -161,18 +158,17 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _as_used(folder: Path) -> Loaded:
-    """The run's own copies of protocol and rig."""
-    return load_protocol(folder / PROTOCOL_FILE, folder / RIG_FILE, check_model=check_model)
-
-
-def _same_files(record: Record, loaded: Loaded) -> None:
+def _as_used(record: Record) -> Loaded:
+    """The run's own copies of protocol and rig; `InputError` when they are not as they were."""
+    folder = record.folder
+    loaded = load_protocol(folder / PROTOCOL_FILE, folder / RIG_FILE, check_model=check_model)
     for key, text in (("protocol", loaded.protocol_text), ("rig", loaded.rig_text)):
         if record.meta(f"{key}_sha256") != _digest(text):
             raise InputError(
-                f"{record.folder / (key + '.yaml')}: changed since the run began, so its readings "
+                f"{folder / (key + '.yaml')}: changed since the run began, so its readings "
                 "would not belong together: restore it, or start a new run"
             )
+    return loaded
 
 
 def _confirm(yes: bool, steps: int) -> None:

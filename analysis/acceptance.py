@@ -167,27 +167,6 @@ def averaged_brdf(
     return np.asarray(sample @ weights / light)
 
 
-def needed_rings(
-    brdf: Brdf,
-    theta_i_deg: ArrayLike,
-    theta_r_deg: ArrayLike,
-    dphi_deg: ArrayLike,
-    acceptance: Acceptance,
-    tolerance: float = 1e-4,
-    most: int = MOST_RINGS,
-) -> int:
-    """The smallest number of rings for which one more changes the averaged BRDF too little.
-
-    Too little is less than `tolerance`, relative, in every one of the geometries. Judged at the
-    patch's centre, since the patch is small beside lamp and lens. Returns `most` where that many
-    are still not enough, as at a sharp kink of a model.
-    """
-    each = rings_each(
-        brdf, theta_i_deg, theta_r_deg, dphi_deg, acceptance, tolerance=tolerance, most=most
-    )
-    return int(np.max(each))
-
-
 def rings_each(
     brdf: Brdf,
     theta_i_deg: ArrayLike,
@@ -198,9 +177,12 @@ def rings_each(
     tolerance: ArrayLike = 1e-4,
     most: int = MOST_RINGS,
 ) -> NDArray[np.int64]:
-    """As `needed_rings`, for each geometry by itself: integers of the angles' shape.
+    """The smallest number of rings, geometry by geometry, that one more changes too little.
 
-    `tolerance` is relative and broadcasts with the angles.
+    Too little is a change of the averaged BRDF by less than `tolerance`, relative, which
+    broadcasts against the angles. Judged at the patch's centre, since the patch is small beside
+    lamp and lens. Gives `most` where that many are still not enough, as at a sharp kink of a
+    model. Integers of the angles' shape.
     """
     given = (theta_i_deg, theta_r_deg, dphi_deg, tolerance)
     arrays = np.broadcast_arrays(*map(_floats, given))
