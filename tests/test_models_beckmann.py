@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from analysis.models import MODELS
 from analysis.models.beckmann_spizzichino import (
-    footprint_area,
     geometric_factor,
     largest_term,
     lobe_brdf,
@@ -21,7 +20,6 @@ from analysis.models.beckmann_spizzichino import (
     poisson_sum,
     poisson_term,
     rough_lobe_brdf,
-    scattered_power,
     smooth_lobe_brdf,
     spike_brdf,
     wave_vector,
@@ -183,38 +181,6 @@ def test_the_far_wing_where_every_term_underflows_but_the_late_ones() -> None:
         assert found == pytest.approx(expected, rel=1e-9)
 
 
-def printed_power(
-    i: float, r: float, p: float, sigma_h: float, T: float, X: float, Y: float
-) -> float:
-    """<E2 E2*> lambda^2-free of (18) with (16), (19)-(22), brackets by the errata; radians."""
-    k, phi = 2 * math.pi, p - math.pi
-    v_x = k * (math.sin(i) - math.sin(r) * math.cos(phi))
-    v_y = k * math.sin(r) * math.sin(phi)
-    g = (2 * math.pi * sigma_h * (math.cos(i) + math.cos(r))) ** 2
-    rho0 = math.sin(v_x * X) / (v_x * X) * math.sin(v_y * Y) / (v_y * Y)
-    D = (1 + math.cos(i) * math.cos(r) - math.sin(i) * math.sin(r) * math.cos(phi)) / (
-        math.cos(i) * (math.cos(i) + math.cos(r))
-    )
-    A, v2 = 4 * X * Y, v_x**2 + v_y**2
-    series = sum(
-        g**m / (math.factorial(m) * m) * math.exp(-v2 * T**2 / (4 * m)) for m in range(1, 80)
-    )
-    spike_and_lobe = rho0**2 + math.pi * T**2 * D**2 / A * series
-    return A**2 * math.cos(i) ** 2 * math.exp(-g) * spike_and_lobe
-
-
-@given(
-    i=st.floats(1.0, 80.0), r=st.floats(1.0, 80.0), p=st.floats(1.0, 179.0),
-    sigma_h=st.floats(0.01, 0.25),
-)  # fmt: skip
-def test_the_scattered_power_as_printed(i: float, r: float, p: float, sigma_h: float) -> None:
-    geometry = Geometry.from_degrees(theta_i=i, theta_r=r, dphi=p)
-    found = scattered_power(geometry, sigma_h, 1.5, 0.7, 0.4)
-    expected = printed_power(*map(math.radians, (i, r, p)), sigma_h, 1.5, 0.7, 0.4)
-    size = float(lobe_brdf(geometry, 1.0, sigma_h, 1.5)) + 1.0
-    assert found == pytest.approx(expected, rel=1e-10, abs=1e-14 * size)
-
-
 @given(theta_i=st.floats(0, 89), theta_r=st.floats(0, 89), dphi=st.floats(0, 360))
 def test_the_vectors(theta_i: float, theta_r: float, dphi: float) -> None:
     geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
@@ -315,13 +281,6 @@ def test_the_spike_is_reciprocal_in_the_mirror_direction_only() -> None:
     ratio = (math.cos(math.radians(40.0)) / math.cos(math.radians(42.0))) ** 2
     assert spike(40.0, 42.0) / spike(42.0, 40.0) == pytest.approx(ratio, rel=1e-10)
     assert ratio == pytest.approx(1.0626, abs=1e-4)
-
-
-def test_the_footprint_of_a_pixel() -> None:
-    # (73): a pixel of 1e-4 mm2, 20 focal lengths away, sees 0.04 mm2 straight on, twice that at 60
-    assert footprint_area(1e-4, 20.0, 0.0, 0.0) == pytest.approx(0.04)
-    assert footprint_area(1e-4, 20.0, 0.0, 60.0) == pytest.approx(0.08)
-    assert footprint_area(1e-4, 20.0, 60.0, 60.0) == pytest.approx(0.04)
 
 
 @given(

@@ -45,7 +45,7 @@ def test_between_its_nodes_too(sigma_deg: float, albedo: float) -> None:
     exact = MODELS["oren_nayar_exact"].brdf(geometry, albedo=albedo, sigma_deg=sigma_deg)
     off = np.abs(integral(geometry, albedo, sigma_deg) / exact - 1)
     assert off.max() <= ERROR
-    assert np.quantile(off, 0.99) <= 5e-4
+    assert np.quantile(off, 0.99) <= 1e-3
     for name in FORMS:
         found = departure(name, geometry, albedo, sigma_deg)
         expected = by_integration(name, geometry, albedo, sigma_deg)

@@ -9,9 +9,8 @@ surface is a perfect conductor; nothing masks or shadows; light bounces once.
 
 Source: S. K. Nayar, K. Ikeuchi, T. Kanade, "Surface Reflection: Physical and Geometrical
 Perspectives", IEEE Transactions on Pattern Analysis and Machine Intelligence 13 (1991), equations
-(16)-(29), (52), (53), (73), (77)-(80), with cosφ_r of the paper = -cos dphi. Its radiances
-(27)-(29), (52), (53) are the BRDF here times the irradiance (80): (μ/ε)^½ E²/2 stands in both and
-cancels (printed once upside down).
+(16)-(22) and (77)-(80), with cosφ_r of the paper = -cos dphi. Its powers and radiances, (18) to
+(29), (52) and (53), are in `scattered_power`.
 """
 
 from __future__ import annotations
@@ -22,8 +21,9 @@ from collections.abc import Callable
 import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity
+from analysis.models.limits import either_grazes, held
 from analysis.models.roughness import curvature_radius, unshadowed_deg
-from analysis.models.specular import GRAZING, off_mirror2
+from analysis.models.specular import off_mirror2
 from instrument.geometry import FloatArray, Geometry
 
 SCALE = Parameter("scale", "1", 0.0, 10.0, 0.1, scale=True)
@@ -71,17 +71,18 @@ def lobe_validity(
 ) -> Validity:
     """Where nothing is shadowed to speak of, on a surface that curves little in a wavelength."""
     del scale
-    limit = math.radians(unshadowed_deg(sigma_h, correlation_length))
-    theta = np.maximum(geometry.theta_i, geometry.theta_r)
-    seen = (theta <= limit) & (np.cos(theta) > GRAZING)
-    curved = curvature_radius(sigma_h, correlation_length) < 1
-    reasons = [
-        f"beyond {math.degrees(limit):.3g} degrees facets are shadowed or masked, which the model "
-        "leaves out; at grazing its 1/cosθ diverges"
-    ]
-    if curved:
-        reasons.append("the surface's radius of curvature is below a wavelength (Kirchhoff)")
-    return Validity(np.asarray(seen & (not curved)), "; ".join(reasons))
+    limit_deg = unshadowed_deg(sigma_h, correlation_length)
+    larger_deg = np.maximum(geometry.theta_i_deg, geometry.theta_r_deg)
+    shadowed = (
+        f"beyond {limit_deg:.3g} degrees facets are shadowed or masked, which the model leaves "
+        "out; at grazing its 1/cosθ diverges"
+    )
+    curved = "the surface's radius of curvature is below a wavelength (Kirchhoff)"
+    return held(
+        geometry,
+        ((larger_deg > limit_deg) | either_grazes(geometry), shadowed),
+        (curvature_radius(sigma_h, correlation_length) < 1, curved),
+    )
 
 
 def smooth_lobe_brdf(
@@ -106,40 +107,22 @@ def rough_lobe_brdf(
         return scale * _before_the_sum(geometry, correlation_length) * np.exp(-q / g) / g
 
 
-def spike_brdf(geometry: Geometry, scale: float, sigma_h: float, X: float, Y: float) -> FloatArray:
+def spike_brdf(
+    geometry: Geometry,
+    scale: float,
+    sigma_h: float,
+    X: FloatArray | float,
+    Y: FloatArray | float,
+) -> FloatArray:
     """The coherent spike in 1/sr: 1991, the first term of (77) over (80), scale f with
 
-    f = (cosθ_i/cosθ_r) A e^{-g} ρ₀², A = 4XY the area that the pixel sees (`footprint_area`).
+    f = (cosθ_i/cosθ_r) A e^{-g} ρ₀², A = 4XY the area that the pixel sees (`patch_of_pixel`).
 
     `X`, `Y` are half its sides in wavelengths, X in the plane of incidence. Reciprocal in the
     mirror direction only: cosθ_i/cosθ_r is not. In all it reflects scale e^{-g} of the light.
     """
     ratio = np.cos(geometry.theta_i) / np.cos(geometry.theta_r)
     return scale * ratio * 4 * X * Y * _coherent(geometry, sigma_h, X, Y)
-
-
-def scattered_power(
-    geometry: Geometry, sigma_h: float, correlation_length: float, X: float, Y: float
-) -> FloatArray:
-    """<E₂E₂*> in units of E₀₁² λ²/R₀²: 1991, (18), of an area A = 4XY; its brackets mended.
-
-    A² cos²θ_i e^{-g} (ρ₀² + (πT²D²/A) Σ…), lengths in wavelengths. `lobe_brdf` and `spike_brdf`
-    for scale 1 are this over A cosθ_i cosθ_r.
-    """
-    whole = spike_brdf(geometry, 1.0, sigma_h, X, Y)
-    whole = whole + lobe_brdf(geometry, 1.0, sigma_h, correlation_length)
-    return 4 * X * Y * np.cos(geometry.theta_i) * np.cos(geometry.theta_r) * whole
-
-
-def footprint_area(
-    pixel_area: float, distance_over_focal_length: float, gamma_deg: float, theta_r_deg: float
-) -> float:
-    """Area of the sample in a pixel, in the unit of `pixel_area`: 1991, equation (73).
-
-    dA_s = dA_im (cosγ/cosθ_r) (z/f)², γ the pixel's angle from the optical axis.
-    """
-    cos_gamma, cos_r = (math.cos(math.radians(a)) for a in (gamma_deg, theta_r_deg))
-    return pixel_area * cos_gamma / cos_r * distance_over_focal_length**2
 
 
 def optical_roughness(geometry: Geometry, sigma_h: float) -> FloatArray:
@@ -179,7 +162,9 @@ def _before_the_sum(geometry: Geometry, correlation_length: float) -> FloatArray
     return math.pi * correlation_length**2 * ratio * np.square(D)
 
 
-def _coherent(geometry: Geometry, sigma_h: float, X: float, Y: float) -> FloatArray:
+def _coherent(
+    geometry: Geometry, sigma_h: float, X: FloatArray | float, Y: FloatArray | float
+) -> FloatArray:
     """e^{-g} ρ₀², with ρ₀ = sinc(v_x X) sinc(v_y Y) (20) and sinc(x) = sin(x)/x."""
     v_x, v_y, _ = wave_vector(geometry)
     rho_0 = np.sinc(v_x * X / math.pi) * np.sinc(v_y * Y / math.pi)

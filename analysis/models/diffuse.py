@@ -15,14 +15,12 @@ import math
 import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity
-from analysis.models.limits import both_graze, held
+from analysis.models.limits import GRAZING, NEGATIVE, both_graze, held
 from instrument.geometry import FloatArray, Geometry
 
 ALBEDO = Parameter("albedo", "1", 0.0, 1.0, 0.5, scale=True)
 SIGMA_DEG = Parameter("sigma_deg", "degrees", 0.0, 60.0, 20.0)
 
-GRAZING = "lamp and camera both graze the surface, where the formula grows without limit"
-NEGATIVE = "negative as printed, far forward at high roughness"
 _FORWARD = "forward, where (36) leaves out more than a fifth of itself: up to twice the integral"
 
 

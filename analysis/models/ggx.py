@@ -16,8 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity
-from analysis.models.diffuse import GRAZING
-from analysis.models.limits import both_graze, held
+from analysis.models.limits import GRAZING, both_graze, held
 from analysis.models.specular import off_mirror2
 from instrument.geometry import FloatArray, Geometry
 

@@ -7,10 +7,18 @@ import numpy as np
 from analysis.models.base import BoolArray, Validity
 from instrument.geometry import Geometry
 
+GRAZING = "lamp and camera both graze the surface, where the formula grows without limit"
+NEGATIVE = "negative as printed, far forward at high roughness"
+
 
 def both_graze(geometry: Geometry) -> BoolArray:
     """Where lamp and camera both lie in the sample's plane: 1/cos and tan(beta) have no limit."""
     return np.asarray(np.minimum(geometry.theta_i_deg, geometry.theta_r_deg) >= 90.0)
+
+
+def either_grazes(geometry: Geometry) -> BoolArray:
+    """Where lamp or camera lies in the sample's plane."""
+    return np.asarray(np.maximum(geometry.theta_i_deg, geometry.theta_r_deg) >= 90.0)
 
 
 def held(geometry: Geometry, *failures: tuple[BoolArray | bool, str]) -> Validity:

@@ -21,6 +21,7 @@ from functools import lru_cache
 import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity
+from analysis.models.limits import GRAZING, both_graze, held
 from instrument.geometry import FloatArray, Geometry
 
 KS = Parameter("ks", "1", 0.0, 10.0, 0.1, scale=True)
@@ -32,7 +33,6 @@ LOBE_SIGMA_DEG = replace(SIGMA_DEG, name="lobe_sigma_deg", default=10.0)
 OfAngle = Callable[[FloatArray], FloatArray]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
-GRAZING = 1e-9  # a cosine smaller than this is that of a direction along the surface
 
 
 def torrance_sparrow_brdf(geometry: Geometry, ks: float, sigma_deg: float) -> FloatArray:
@@ -79,9 +79,7 @@ def torrance_sparrow_lobe_slopes(
 
 def torrance_sparrow_validity(geometry: Geometry, **_: float) -> Validity:
     """Everywhere but where lamp and camera both graze: P / cos is without limit there."""
-    cos = np.maximum(np.cos(geometry.theta_i), np.cos(geometry.theta_r))
-    reason = "lamp and camera both graze the surface: the printed formula has no limit there"
-    return Validity(np.asarray(cos > GRAZING), reason)
+    return held(geometry, (both_graze(geometry), GRAZING))
 
 
 def torrance_sparrow_full(

@@ -13,7 +13,8 @@ import math
 import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity
-from analysis.models.specular import GRAZING, SIGMA_DEG, half_vector, off_mirror2
+from analysis.models.limits import either_grazes, held
+from analysis.models.specular import SIGMA_DEG, half_vector, off_mirror2
 from instrument.geometry import FloatArray, Geometry
 
 DIFFUSE = Parameter("diffuse", "1", 0.0, 1.0, 0.5, scale=True)
@@ -72,9 +73,8 @@ def unified_slopes(
 
 def unified_validity(geometry: Geometry, **_: float) -> Validity:
     """Up to where lamp or camera grazes: 1/cosθ has no limit there."""
-    least = np.minimum(np.cos(geometry.theta_i), np.cos(geometry.theta_r))
     reason = "lamp or camera grazes the surface: the printed 1/cosθ, without attenuation, diverges"
-    return Validity(np.asarray(least > GRAZING), reason)
+    return held(geometry, (either_grazes(geometry), reason))
 
 
 def moving_sensor(

@@ -18,14 +18,12 @@ from analysis.models.base import Model, Parameter, Validity
 from analysis.models.chandrasekhar import h_exact, log_h_slope
 from analysis.models.diffuse import (
     ALBEDO,
-    GRAZING,
-    NEGATIVE,
     SIGMA_DEG,
     roughness_terms,
     sigma_terms_slopes,
 )
 from analysis.models.fresnel import transmittance, transmittance_slope
-from analysis.models.limits import both_graze, held
+from analysis.models.limits import GRAZING, NEGATIVE, both_graze, held
 from analysis.models.quadrature import W, X
 from instrument.geometry import FloatArray, Geometry
 
