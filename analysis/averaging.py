@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.acceptance import Acceptance, averaged_brdf, rings_each
+from analysis.descent import Minimum
 from analysis.measurements import IntArray, Measurements
-from analysis.problem import Problem, Solution
+from analysis.problem import Problem
 from instrument.geometry import FloatArray, Geometry
 
 MOST_ROUNDS = 12
@@ -30,14 +31,14 @@ class Averaged:
     """A solution, its problem, whether averaging was worth it, and whether its rounds settled."""
 
     problem: Problem
-    solution: Solution
+    solution: Minimum
     used: bool
     settled: bool
 
 
 def average(
     problem: Problem,
-    solution: Solution,
+    solution: Minimum,
     measurements: Measurements,
     acceptance: Acceptance,
     u: FloatArray,

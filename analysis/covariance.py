@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.measurements import IntArray, Measurements
 from instrument.geometry import FloatArray, Geometry
@@ -61,6 +62,10 @@ class Covariance:
         The mean of the errors' normal distribution given the residual: common^T C^-1 residual.
         """
         return np.asarray(self.whiten(self.common).T @ self.whiten(residual))
+
+    def of(self, points: NDArray[np.bool_]) -> Covariance:
+        """Covariance of some of the points (N,)."""
+        return Covariance(self.variance[points], self.common[points], self.names)
 
     @property
     def u_total(self) -> FloatArray:

@@ -12,7 +12,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import brentq
 
-from analysis.problem import Problem, Solution
+from analysis.descent import Minimum
+from analysis.problem import Problem
 
 RISE_95 = 3.84
 
@@ -22,7 +23,7 @@ _NEAREST, _WIDEN, _RELATIVE = 1e-9, 3.0, 0.01
 
 
 def interval(
-    problem: Problem, best: Solution, index: int, rise: float = RISE_95
+    problem: Problem, best: Minimum, index: int, rise: float = RISE_95
 ) -> tuple[float, float]:
     """Profile-likelihood interval of the parameter at `index`, in its own unit.
 
@@ -34,7 +35,7 @@ def interval(
     )
 
 
-def _end(problem: Problem, best: Solution, index: int, bound: float, rise: float) -> float:
+def _end(problem: Problem, best: Minimum, index: int, bound: float, rise: float) -> float:
     middle = float(best.x[index])
     if middle == bound:
         return bound
@@ -54,7 +55,7 @@ def _end(problem: Problem, best: Solution, index: int, bound: float, rise: float
     return float(brentq(excess, inner, outer, xtol=_RELATIVE * abs(outer - middle)))
 
 
-def _first_step(problem: Problem, best: Solution, index: int, rise: float) -> float:
+def _first_step(problem: Problem, best: Minimum, index: int, rise: float) -> float:
     """The distance at which the parameter alone would raise chi2 by `rise`, roughly."""
     domain = float(problem.high[index] - problem.low[index])
     slope = float(np.linalg.norm(problem.jacobian(best.x, [index])))

@@ -54,6 +54,7 @@ class Measurements:
     shared: further errors that points share, as those of a white tile or of the dark.
     u_theta_i_deg, u_theta_r_deg, u_dphi_deg: of the angles, in degrees; points of the same
         theta_r share its error.
+    relative: `brdf` and `u_random` are a radiance in a unit of its own, tied to no reference.
 
     Raises `ValueError` for shapes that differ, values that are not finite, angles outside their
     domain, a `u_random` that is not positive, or a negative uncertainty of an angle.
@@ -69,6 +70,7 @@ class Measurements:
     u_theta_i_deg: float = 0.0
     u_theta_r_deg: float = 0.0
     u_dphi_deg: float = 0.0
+    relative: bool = False
 
     def __post_init__(self) -> None:
         self._check_arrays()

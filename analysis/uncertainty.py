@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.descent import Minimum
 from analysis.interval import RISE_95, interval
-from analysis.problem import Problem, Solution
+from analysis.problem import Problem
 from instrument.geometry import FloatArray
 
 # Below this part of the largest singular value a combination of parameters is not determined.
@@ -38,7 +39,7 @@ class Uncertainty:
     correlation: FloatArray
 
 
-def uncertainty(problem: Problem, best: Solution, variance: float) -> Uncertainty:
+def uncertainty(problem: Problem, best: Minimum, variance: float) -> Uncertainty:
     """Uncertainties of the parameters at a minimum, in their own units.
 
     `variance` is that of the whitened residuals: 1 where the data's u is stated, else estimated.

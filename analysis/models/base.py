@@ -37,7 +37,8 @@ class Parameter:
 
     `unit` is as people write it ("1" for a pure number). `scale` says that its part of the BRDF
     rises about in proportion to it from zero: a fit then solves for its first value instead of
-    searching.
+    searching. `starts`: values from which a fit tries the search; none given: seven over the
+    domain, denser towards its low end, as narrow lobes are easier to miss than wide ones.
     """
 
     name: str
@@ -46,13 +47,19 @@ class Parameter:
     high: float
     default: float
     scale: bool = False
+    starts: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
             raise ValueError(
                 f"{self.name}: bounds {self.low:g} to {self.high:g} are not finite and rising"
             )
-        self.check(self.default)
+        for value in (self.default, *self.starts):
+            self.check(value)
+        if not self.starts:
+            parts = ((k + 0.5) / 7 for k in range(7))
+            starts = tuple(self.low + part * part * (self.high - self.low) for part in parts)
+            object.__setattr__(self, "starts", starts)
         if self.scale and not self.low == 0 < self.default:
             raise ValueError(
                 f"{self.name}: a scale has the lower bound 0 and a default above it; "
@@ -80,7 +87,7 @@ class Model:
     the integral; None: `gradient` then takes central differences. `holds`: kernel of `validity`;
     None: the model holds wherever it is defined. `in_blocks`: large arrays go through the kernel
     in blocks that stay in the processor's cache, which takes two thirds of the time; not for a
-    kernel that keeps what belongs to a whole set of geometries.
+    kernel that keeps what belongs to a whole set of geometries. `terms`: the models of a sum.
     """
 
     name: str
@@ -89,6 +96,7 @@ class Model:
     slopes: Callable[..., dict[str, FloatArray]] | None = None
     holds: Callable[..., Validity] | None = None
     in_blocks: bool = True
+    terms: tuple[Model, ...] = ()
 
     def brdf(self, geometry: Geometry, **parameters: float) -> FloatArray:
         """BRDF in 1/sr, float64, of the geometry's shape.
@@ -181,7 +189,7 @@ def add(*models: Model) -> Model:
 
     name = "+".join(m.name for m in models)
     whole = all(model.in_blocks for model in models)
-    return Model(name, tuple(shared.values()), kernel, slopes, holds, in_blocks=whole)
+    return Model(name, tuple(shared.values()), kernel, slopes, holds, in_blocks=whole, terms=models)
 
 
 def _intersection(a: Parameter, b: Parameter) -> Parameter:
@@ -191,4 +199,6 @@ def _intersection(a: Parameter, b: Parameter) -> Parameter:
             f"{a.name} cannot be shared: {a.domain} in one model, {b.domain} in the other"
         )
     default = a.default if low <= a.default <= high else (low + high) / 2
-    return replace(a, low=low, high=high, default=default, scale=a.scale and b.scale)
+    starts = tuple(value for value in a.starts if low <= value <= high)
+    scale = a.scale and b.scale
+    return replace(a, low=low, high=high, default=default, scale=scale, starts=starts)
