@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition.reduction import Reduced, root_sum_square
 from analysis.acceptance import Acceptance
-from analysis.choice import LADDER, Choice, choose
+from analysis.choice import Choice, choose
 from analysis.fit import FitResult, stated_u
 from analysis.measurements import Measurements
 from instrument.config import Loaded
@@ -50,10 +50,9 @@ def fit_run(reduced: Reduced, loaded: Loaded) -> Fitted:
     """Fit the sound points; what keeps a fit from being made is said, not raised."""
     if loaded.protocol.references.white_tile is None:
         return Fitted(None, reduced.sound, NO_TILE)
-    models = loaded.protocol.fit.models or LADDER
     acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
     try:
-        choice = choose(measurements(reduced, loaded), acceptance, models)
+        choice = choose(measurements(reduced, loaded), acceptance, loaded.protocol.fit.models)
     except NotDetermined as error:
         return Fitted(None, reduced.sound, str(error))
     return Fitted(choice, reduced.sound, choice.reason)

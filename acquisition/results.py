@@ -14,7 +14,7 @@ from acquisition.fitting import fit_run
 from acquisition.reduction import Reduced, reduce
 from acquisition.remarks import budget, headline, notes, parameters_of
 from acquisition.report_of import report_data
-from analysis.choice import to_json
+from analysis.fit_json import to_json
 from analysis.report import write_report
 from analysis.report_data import Parameter
 from instrument.config import Loaded

@@ -1,37 +1,49 @@
-"""Which model: the simplest that the data cannot tell from the best, or none that is adequate."""
+"""Which model: the simplest that the data cannot tell from the best, or none that is adequate.
+
+A larger model has to earn its parameters twice: by Schwarz's criterion (BIC), and by foretelling
+incidences or blocks of view angle that were left out of its fit.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from analysis.acceptance import Acceptance
-from analysis.fit import UNLIKELY, FitResult, determined, first_fit, probability, refined
+from analysis.fit import (
+    LEAST_NOISE,
+    UNLIKELY,
+    FirstFit,
+    FitResult,
+    determined,
+    first_fit,
+    probability,
+    refined,
+)
+from analysis.held_out import folds, held_out
+from analysis.ladder import LADDER, approximation, physics
 from analysis.measurements import Measurements
 from analysis.models import MODELS
+from analysis.models.departure import departure
+from analysis.relative import NAME as RELATIVE_FACTOR
+from analysis.structure import failures, runs_probability
+from analysis.symmetry import Symmetry, symmetry
 from instrument.errors import NotDetermined
+from instrument.geometry import FloatArray
 
-# Of rising cost, which breaks ties between models with as many parameters.
-LADDER = (
-    "lambert",
-    "oren_nayar_qualitative",
-    "oren_nayar",
-    "lambert+torrance_sparrow",
-    "oren_nayar_qualitative+torrance_sparrow",
-    "oren_nayar+torrance_sparrow",
-)
-
-# Kass and Raftery, "Bayes Factors" (1995), table: strong evidence begins at a difference of 6.
-STRONG_BIC = 6.0
-# Predictions that differ less than this part of u_total are the same for all that they serve.
+# A larger BIC by less than this is no evidence (Kass and Raftery, "Bayes Factors", 1995: "not
+# worth more than a bare mention").
+TIE_BIC = 2.0
+# Predictions that differ less than this part of u are the same for all that they serve.
 SAME_PREDICTION = 1 / 3
-# Such a simpler model may leave this many times the chi2 that the best one leaves unexplained.
+# Such a cheaper method may leave this many times the chi2 that the better one leaves.
 SAME_CHI2 = 2.0
 MOST_RMS_RELATIVE = 0.05
+# A first fit with so many times the best one's chi2 is not made better by averaging over the rig.
+_HOPELESS = 25.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,37 +51,74 @@ class Choice:
     """All candidates as fitted, the chosen one's name, a verdict on it, and why.
 
     verdict: "adequate", "none adequate" or "not identifiable" (it agrees, but has a parameter
-    that the data do not determine). `chosen` is None only where no fit converged.
+    that the data do not determine). `chosen` is None only where no fit converged. symmetry: the
+    test of 1998, section 3.1, None where nothing is chosen.
     """
 
     candidates: tuple[FitResult, ...]
     chosen: str | None
     verdict: str
     reason: str
+    symmetry: Symmetry | None = None
 
 
 def choose(
     measurements: Measurements,
     acceptance: Acceptance | None = None,
-    models: Sequence[str] = LADDER,
+    models: Sequence[str] | None = None,
+    robust: bool = False,
 ) -> Choice:
     """Fit every model and choose the simplest that explains the data as well as the best does.
 
     A first pass with independent uncertainties finds the best smooth curve near the data; around
     it the second pass makes the covariance of all uncertainties for every candidate. Models with
-    too many parameters for the points are left out. Raises `NotDetermined` when that are all of
-    them, `KeyError` for an unknown model.
+    too many parameters for the points are left out; without `models`, which are then those of the
+    ladder, so is an integrated one whose functional form is as good. Raises `NotDetermined` when
+    too few points leave none of them, `KeyError` for an unknown model.
     """
-    named = [MODELS[name] for name in models]
-    first = [first_fit(model, measurements) for model in named if determined(model, measurements)]
-    if not first:
-        raise NotDetermined(
-            f"{measurements.size} points are too few to fit any of: {', '.join(models)}"
-        )
-    best = min(first, key=lambda f: (not f.solution.converged, f.bic))
-    candidates = tuple(refined(f, measurements, acceptance, best.brdf) for f in first)
-    left_out = [m.name for m in named if not determined(m, measurements)]
-    return _chosen(candidates, measurements, left_out)
+    named = [MODELS[name] for name in models or LADDER]
+    possible = [model.name for model in named if determined(model, measurements)]
+    if not possible:
+        names = ", ".join(model.name for model in named)
+        raise NotDetermined(f"{measurements.size} points are too few to fit any of: {names}")
+    first = _first_fits(possible, measurements, robust, every=models is not None)
+    best = min(first.values(), key=lambda f: (not f.solution.converged, f.bic))
+    candidates = tuple(
+        refined(f, measurements, None if _hopeless(f, best) else acceptance, best.brdf)
+        for f in first.values()
+    )
+    return _chosen(candidates, measurements, [m.name for m in named if m.name not in possible])
+
+
+def _first_fits(
+    names: Sequence[str], measurements: Measurements, robust: bool, every: bool
+) -> dict[str, FirstFit]:
+    """First fits by name, in that order; an integrated model where it may differ, or `every`."""
+    fits: dict[str, FirstFit] = {}
+    for name in names:
+        form = fits.get(approximation(name) or "")
+        if every or form is None or _leaves_integral(form, measurements):
+            fits[name] = first_fit(MODELS[name], measurements, robust)
+    return fits
+
+
+def _leaves_integral(form: FirstFit, measurements: Measurements) -> bool:
+    """Whether the functional form, as fitted, is off the integral by more than u/3 anywhere."""
+    names = [p.name for p in form.problem.model.parameters]
+    values = dict(zip(names, map(float, form.solution.x), strict=True))
+    geometry, albedo, sigma = measurements.geometry, values["albedo"], values["sigma_deg"]
+    rough = MODELS["oren_nayar"].brdf(geometry, albedo=albedo, sigma_deg=sigma)
+    rough *= values.get(RELATIVE_FACTOR, 1.0)
+    off = np.abs(rough * departure("oren_nayar", geometry, albedo, sigma))
+    u = measurements.u_random
+    if u is None:
+        left = form.problem.predict(form.solution.x) - measurements.brdf
+        u = np.full(measurements.size, float(np.sqrt(np.mean(np.square(left)))))
+    return bool(np.any(off > SAME_PREDICTION * u))
+
+
+def _hopeless(fit: FirstFit, best: FirstFit) -> bool:
+    return fit.solution.chi2 > _HOPELESS * max(best.solution.chi2, float(fit.problem.brdf.size))
 
 
 def _chosen(
@@ -79,42 +128,61 @@ def _chosen(
     if not converged:
         return Choice(candidates, None, "none adequate", "no fit converged")
     best = min(converged, key=lambda c: c.bic)
-    tied = [c for c in converged if _as_good(c, best, measurements.size)]
-    chosen = min(tied, key=lambda c: len(c.values))  # the first of them: the ladder's order
+    chosen = _simplest(converged, best, measurements)
     verdict, reason = _judged(chosen, measurements)
     if chosen is not best:
-        reason += f"; the data do not tell it from {best.model}, which has the best BIC"
+        reason += f"; {best.model}, which has the best BIC, does not earn what it costs"
     if left_out:
         reason += f"; left out, too few points: {', '.join(left_out)}"
-    return Choice(candidates, chosen.model, verdict, reason)
+    noise = max(chosen.rms_relative, LEAST_NOISE) * float(np.mean(measurements.brdf))
+    tested = symmetry(measurements, chosen.brdf, noise)
+    return Choice(candidates, chosen.model, verdict, reason, tested)
 
 
-def _as_good(candidate: FitResult, best: FitResult, points: int) -> bool:
-    """Whether the data cannot tell a candidate from the best one."""
-    return _bic_above(candidate, best, points) < STRONG_BIC or _same(candidate, best)
+def _simplest(
+    converged: Iterable[FitResult], best: FitResult, measurements: Measurements
+) -> FitResult:
+    """The last of the candidates, by rising number of parameters and cost, that earns its place."""
+    left_out = folds(measurements)
+    scores: dict[str, float] = {}
+
+    def score(candidate: FitResult) -> float:
+        if candidate.model not in scores:
+            scores[candidate.model] = held_out(candidate.problem, candidate.x, left_out)
+        return scores[candidate.model]
+
+    current, *larger = sorted(converged, key=lambda c: c.x.size)  # stable: the ladder's order
+    for candidate in larger:
+        better = _bic_above(current, candidate, best, measurements.size) > TIE_BIC
+        if not better or _same(current, candidate):
+            continue
+        if not left_out or score(candidate) < score(current):
+            current = candidate
+    return current
 
 
-def _bic_above(candidate: FitResult, best: FitResult, points: int) -> float:
-    """How far the BIC lies above the best one's, misfit of the best counting as noise.
+def _bic_above(candidate: FitResult, other: FitResult, best: FitResult, points: int) -> float:
+    """How far a candidate's BIC lies above another's, misfit of the best counting as noise.
 
     Where even the best model leaves more than the stated u explains, that unknown error is not
     evidence for any model: chi2 is scaled by the best one's reduced chi2 (Birge 1932).
     """
-    if candidate.chi2 is None or best.chi2 is None:
-        return candidate.bic - best.bic
-    more = len(candidate.values) - len(best.values)
-    birge = max(1.0, best.reduced_chi2 or 1.0)
-    return (candidate.chi2 - best.chi2) / birge + more * math.log(points)
+    if candidate.chi2 is None or other.chi2 is None:
+        return candidate.bic - other.bic
+    more = candidate.x.size - other.x.size
+    loss = candidate.bic - other.bic - more * math.log(points)
+    return loss / max(1.0, best.reduced_chi2 or 1.0) + more * math.log(points)
 
 
-def _same(candidate: FitResult, best: FitResult) -> bool:
-    """Whether two models predict the same within u_total, and explain about as much."""
-    apart = np.abs(candidate.predicted - best.predicted)
-    if np.any(apart >= SAME_PREDICTION * best.u_total):
+def _same(cheaper: FitResult, other: FitResult) -> bool:
+    """Whether two methods for one physics predict the same within u, and explain about as much."""
+    if physics(cheaper.model) != physics(other.model):
         return False
-    if candidate.chi2 is None or best.chi2 is None:
+    if np.any(np.abs(cheaper.predicted - other.predicted) >= SAME_PREDICTION * other.u_total):
+        return False
+    if cheaper.chi2 is None or other.chi2 is None:
         return True
-    return candidate.chi2 <= SAME_CHI2 * best.chi2 or _probability(candidate) > UNLIKELY
+    return cheaper.chi2 <= SAME_CHI2 * other.chi2 or _probability(cheaper) > UNLIKELY
 
 
 def _probability(result: FitResult) -> float:
@@ -122,9 +190,9 @@ def _probability(result: FitResult) -> float:
 
 
 def _judged(chosen: FitResult, measurements: Measurements) -> tuple[str, str]:
-    if chosen.dof == 0:
+    if chosen.dof <= 0:
         return "not identifiable", f"{chosen.model}: as many parameters as points, nothing to test"
-    adequate, reason = _adequate(chosen)
+    adequate, reason = _adequate(chosen, measurements)
     if not adequate:
         return "none adequate", f"{reason}; worst at {_worst(chosen, measurements)}"
     if chosen.undetermined:
@@ -137,54 +205,26 @@ def _judged(chosen: FitResult, measurements: Measurements) -> tuple[str, str]:
     return "adequate", reason
 
 
-def _adequate(chosen: FitResult) -> tuple[bool, str]:
+def _adequate(chosen: FitResult, measurements: Measurements) -> tuple[bool, str]:
+    aside = int(np.sum(chosen.outliers))
+    set_aside = f", {aside} outliers set aside" if aside else ""
     if chosen.chi2 is None:
         rms = 100 * chosen.rms_relative
         words = f"{chosen.model}: rms residual {rms:.3g} % of the mean, allowed 5 % (no u stated)"
-        return chosen.rms_relative <= MOST_RMS_RELATIVE, words
-    probability = _probability(chosen)
+        return chosen.rms_relative <= MOST_RMS_RELATIVE, words + set_aside
+    by_chi2, by_runs = _probability(chosen), runs_probability(measurements, _kept(chosen))
     words = (
         f"{chosen.model}: chi2 {chosen.chi2:.4g} for {chosen.dof} degrees of freedom, "
-        f"p = {probability:.2g} (rejected below {UNLIKELY:g})"
+        f"p = {by_chi2:.2g}; runs of residuals of one sign, p = {by_runs:.2g} "
+        f"(rejected below {UNLIKELY:g}){set_aside}"
     )
-    return probability > UNLIKELY, words
+    return min(by_chi2, by_runs) > UNLIKELY, words
 
 
-def _worst(chosen: FitResult, m: Measurements, count: int = 3) -> str:
-    order = np.argsort(-np.abs(chosen.residuals))[:count]
-    return ", ".join(
-        f"theta_i {m.theta_i_deg[i]:g}, theta_r {m.theta_r_deg[i]:g}, dphi {m.dphi_deg[i]:g} "
-        f"degrees ({chosen.residuals[i]:+.1f} u)"
-        for i in order
-    )
+def _kept(result: FitResult) -> FloatArray:
+    """Residuals, 0 for the points that are set aside: a run has no sign there."""
+    return np.where(result.outliers, 0.0, result.residuals)
 
 
-def to_json(choice: Choice) -> dict[str, Any]:
-    """The choice as `fit.json` holds it: for `json.dumps(..., allow_nan=False)`."""
-    return {
-        "chosen": choice.chosen,
-        "verdict": choice.verdict,
-        "candidates": [_candidate(c) for c in choice.candidates],
-    }
-
-
-def _candidate(result: FitResult) -> dict[str, Any]:
-    return {
-        "model": result.model,
-        "parameters": {name: _parameter(result, name) for name in result.values},
-        "rms_relative": _number(result.rms_relative),
-        "reduced_chi2": _number(result.reduced_chi2),
-        "bic": _number(result.bic),
-        "converged": result.converged,
-    }
-
-
-def _parameter(result: FitResult, name: str) -> dict[str, Any]:
-    entry: dict[str, Any] = {"value": _number(result.values[name]), "u": _number(result.u[name])}
-    if name in result.intervals:
-        entry["interval"] = [_number(end) for end in result.intervals[name]]
-    return entry
-
-
-def _number(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(value)
+def _worst(chosen: FitResult, measurements: Measurements) -> str:
+    return "; ".join(map(str, failures(measurements, _kept(chosen))))

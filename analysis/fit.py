@@ -48,9 +48,10 @@ _PER_MEDIAN = 1.4826
 class FitResult:
     """A model fitted to N points; mappings are by parameter name, in the parameters' units.
 
-    values: best values. u: standard uncertainties, None where none holds; then `intervals` has
-    the 95 % profile-likelihood interval. undetermined: parameters that may lie anywhere in more
-    than half of their domain. correlation: (K, K), NaN for a parameter without u.
+    problem, x: what was solved, and the parameters (K,) in the model's order. values: the same by
+    name. u: standard uncertainties, None where none holds; then `intervals` has the 95 %
+    profile-likelihood interval. undetermined: parameters that may lie anywhere in more than half
+    of their domain. correlation: (K, K), NaN for a parameter without u.
     predicted: (N,) in 1/sr. u_total: (N,) in 1/sr, of each point, estimated from the residuals
     where no u is stated. residuals: (N,), measured minus predicted, less the likeliest
     values of the errors that points share, in units of the part of u that they do not share.
@@ -63,6 +64,8 @@ class FitResult:
     """
 
     model: str
+    problem: Problem
+    x: FloatArray
     values: Mapping[str, float]
     u: Mapping[str, float | None]
     intervals: Mapping[str, tuple[float, float]]
@@ -82,6 +85,10 @@ class FitResult:
     averaged: bool
     converged: bool
     message: str
+
+    def brdf(self, geometry: Geometry) -> FloatArray:
+        """The fitted model in any geometry, in 1/sr, as it is without a rig's averaging."""
+        return self.problem.plain(self.x, geometry)
 
 
 def fit(
@@ -306,6 +313,8 @@ def _result(m: Measurements, whole: Averaged, covariance: Covariance) -> FitResu
     found = found._replace(chi2=problem.chi2(x))
     return FitResult(
         model=problem.model.name,
+        problem=problem,
+        x=x,
         values=dict(zip(known.u, map(float, x), strict=True)),
         u=known.u,
         intervals=known.intervals,

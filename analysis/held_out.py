@@ -1,0 +1,49 @@
+"""How well a model foretells what it was not fitted to: whole incidences, or blocks of view angle.
+
+Single points would not do: their neighbours nearly tell them, also to a model that is wrong.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.descent import loss
+from analysis.measurements import Measurements
+from analysis.models.base import BoolArray
+from analysis.problem import Problem
+from analysis.sweeps import signed_view
+from instrument.geometry import FloatArray
+
+MOST_FOLDS = 5
+_LEAST_INCIDENCES = 3
+
+
+def folds(m: Measurements) -> list[BoolArray]:
+    """Points to leave out, (N,) each: incidences together, or, of fewer than three, view angles."""
+    incidences = np.round(m.theta_i_deg, 3)
+    if np.unique(incidences).size >= _LEAST_INCIDENCES:
+        return _blocks(incidences)
+    return _blocks(signed_view(m))
+
+
+def _blocks(values: FloatArray) -> list[BoolArray]:
+    """Blocks of neighbouring values, about as many points in each; equal values stay together."""
+    known, member, count = np.unique(values, return_inverse=True, return_counts=True)
+    number = min(MOST_FOLDS, known.size)
+    middle = np.cumsum(count) - count / 2
+    block: NDArray[np.int64] = np.floor(middle * number / values.size).astype(np.int64)
+    found = [block[member.reshape(-1)] == n for n in range(number)]
+    return [points for points in found if np.any(points)]
+
+
+def held_out(problem: Problem, x: FloatArray, left_out: list[BoolArray]) -> float:
+    """Sum over the folds of chi2 (or the robust loss) of the points left out of the fit.
+
+    `x` is the fit to all points, from which those to fewer start.
+    """
+    total = 0.0
+    for points in left_out:
+        found = problem.of(~points).solve(x)
+        total += loss(problem.of(points).residual(found.x), problem.huber)
+    return total

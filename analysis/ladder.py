@@ -1,0 +1,36 @@
+"""The candidates among which the program chooses, from Lambert's law up.
+
+Methods for the same physics stand in the order of their cost: of those that the data cannot tell
+apart the first is taken.
+"""
+
+from __future__ import annotations
+
+LADDER = (
+    "lambert",
+    "oren_nayar_qualitative",
+    "oren_nayar",
+    "oren_nayar_exact",
+    "wolff",
+    "lambert+torrance_sparrow",
+    "oren_nayar_qualitative+torrance_sparrow",
+    "oren_nayar+torrance_sparrow",
+    "oren_nayar_exact+torrance_sparrow",
+)
+
+# The rough diffuse surface by rising cost: one physics, three methods.
+_ROUGH = ("oren_nayar_qualitative", "oren_nayar", "oren_nayar_exact")
+_EXACT, _FUNCTIONAL = "oren_nayar_exact", "oren_nayar"
+
+
+def physics(name: str) -> str:
+    """The candidate's name with all methods for one physics called alike."""
+    return "+".join("rough" if term in _ROUGH else term for term in name.split("+"))
+
+
+def approximation(name: str) -> str | None:
+    """The functional form of a candidate that integrates; None if it does not."""
+    terms = name.split("+")
+    if _EXACT not in terms:
+        return None
+    return "+".join(_FUNCTIONAL if term == _EXACT else term for term in terms)

@@ -1,0 +1,97 @@
+"""Rough or smooth? Whether a surface looks alike from both sides of its normal.
+
+Source: L. B. Wolff, S. K. Nayar, M. Oren, "Improved Diffuse Reflection Models for Computer Vision",
+International Journal of Computer Vision 30 (1998), section 3.1: at a fixed incidence a smooth
+surface's diffuse radiance is symmetric about theta_r = 0, a rough surface's is not.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import chdtrc
+
+from analysis.covariance import Brdf, shared
+from analysis.measurements import Measurements
+from analysis.sweeps import in_plane, sweeps
+from instrument.geometry import FloatArray
+
+# A difference less probable than this is one of the surface.
+UNLIKELY = 1e-3
+# Nearer to the normal the lamp itself is too symmetric, and so is the dphi = 90 degrees plane.
+_LEAST_THETA_I_DEG = 5.0
+_LEAST_OFF_DEG = 5.0
+# The same view angle on both sides, in degrees.
+_SAME = 0.01
+
+
+class Symmetry(NamedTuple):
+    """The test's outcome.
+
+    says: "rough" (asymmetric), "smooth" (symmetric) or "not tested" (no pairs of view angles).
+    pairs: how many were compared. asymmetry: (lamp's side - mirror side) over their sum, the mean
+    over the pairs. probability: of differences as large as these if the surface were symmetric.
+    """
+
+    says: str
+    pairs: int
+    asymmetry: float
+    probability: float
+
+    def __str__(self) -> str:
+        if self.pairs == 0:
+            return "symmetry in theta_r: not tested (no view angle on both sides of the normal)"
+        side = "lamp's" if self.asymmetry > 0 else "mirror"
+        return (
+            f"symmetry in theta_r: {self.says} ({self.pairs} pairs; {side} side brighter by "
+            f"{200 * abs(self.asymmetry):.2g} %, p = {self.probability:.2g})"
+        )
+
+
+def symmetry(m: Measurements, smooth: Brdf, noise: float) -> Symmetry:
+    """Compare the points at theta_r with those at -theta_r of the same sweep.
+
+    `smooth` is a model near the data, which turns errors of angles into such of the BRDF; `noise`,
+    in 1/sr, is the standard deviation of a point where the measurements state no u.
+    """
+    pairs = _pairs(m)
+    if not pairs:
+        return Symmetry("not tested", 0, 0.0, 1.0)
+    lamp, mirror = np.array(pairs).T
+    difference = m.brdf[lamp] - m.brdf[mirror]
+    total = m.brdf[lamp] + m.brdf[mirror]
+    chi2 = float(difference @ np.linalg.solve(_covariance(m, smooth, noise, pairs), difference))
+    probability = float(chdtrc(float(len(pairs)), chi2))
+    says = "rough" if probability < UNLIKELY else "smooth"
+    return Symmetry(says, len(pairs), float(np.mean(difference) / np.mean(total)), probability)
+
+
+def _pairs(m: Measurements) -> list[tuple[int, int]]:
+    """Places of the points on the lamp's side, and of their twins on the mirror side."""
+    _, views = in_plane(m)
+    found = []
+    for theta_i, dphi, points in sweeps(m):
+        if theta_i < _LEAST_THETA_I_DEG or abs(dphi - 90) < _LEAST_OFF_DEG:
+            continue
+        towards = 1.0 if dphi < 90 else -1.0  # the sign of theta_r on the lamp's side
+        sides = towards * views[points]
+        for k in np.flatnonzero(sides > _SAME):
+            twin = int(np.argmin(np.abs(sides + sides[k])))
+            if abs(sides[twin] + sides[k]) < _SAME:
+                found.append((int(points[k]), int(points[twin])))
+    return found
+
+
+def _covariance(
+    m: Measurements, smooth: Brdf, noise: float, pairs: list[tuple[int, int]]
+) -> FloatArray:
+    """Covariance of the differences, (P, P)."""
+    D = np.zeros((len(pairs), m.size))
+    for n, (lamp, mirror) in enumerate(pairs):
+        D[n, lamp], D[n, mirror] = 1.0, -1.0
+    if m.u_random is None:
+        return np.asarray(noise**2 * (D @ D.T))
+    C = shared(m, smooth)
+    common = D @ C.common
+    return np.asarray((D * C.variance) @ D.T + common @ common.T)
