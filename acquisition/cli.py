@@ -65,6 +65,38 @@ def resume(
 
 
 @app.command()
+def fit(
+    source: Annotated[Path, typer.Argument(help="A run's folder, or a CSV table.")],
+    models: Annotated[
+        str | None,
+        typer.Option(help="Candidates, parted by commas. Default: the ladder from Lambert up."),
+    ] = None,
+    max_theta_deg: Annotated[
+        float, typer.Option(help="Leave out points with a larger theta_i or theta_r.")
+    ] = 90.0,
+    format: Annotated[
+        str, typer.Option(help="run, csv or curet; auto: a run's folder, else a CSV.")
+    ] = "auto",
+    sample: Annotated[int | None, typer.Option(help="Which material of a curet folder.")] = None,
+    robust: Annotated[
+        bool, typer.Option("--robust", help="Outliers count less, and are named.")
+    ] = False,
+    relative: Annotated[
+        bool, typer.Option("--relative", help="The values are tied to no reference.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Find the simplest model that explains a run or a CSV table of BRDF.
+
+    A CSV has the columns theta_i_deg, theta_r_deg, dphi_deg, brdf and, where it is known, u_brdf.
+    Ends with 0 whether a model is adequate or none is, with 5 where the data do not determine the
+    parameters.
+    """
+    wanted = (format, sample, max_theta_deg, relative)
+    _do("fit_source", source, models, robust, json, *wanted, module="acquisition.fit_command")
+
+
+@app.command()
 def report(folder: RunFolder, json: Json = False) -> None:
     """Fit a finished run again and write its tables and its report anew."""
     _do("report_run", folder, json)
@@ -83,10 +115,10 @@ def _as_interrupt(number: int, frame: object) -> None:  # noqa: ARG001 - a signa
     raise KeyboardInterrupt
 
 
-def _do(command: str, *arguments: object) -> None:
-    """Run a command of `acquisition.run`; what can go wrong becomes a message and an exit code."""
+def _do(command: str, *arguments: object, module: str = "acquisition.run") -> None:
+    """Run a module's command; what can go wrong becomes a message and an exit code."""
     try:
-        getattr(importlib.import_module("acquisition.run"), command)(*arguments)
+        getattr(importlib.import_module(module), command)(*arguments)
     except GonioError as error:
         sys.stderr.write(f"{error}\n")
         raise typer.Exit(error.exit_code) from None

@@ -17,11 +17,6 @@ from instrument.config import Loaded
 from instrument.errors import NotDetermined
 from instrument.geometry import FloatArray
 
-NO_TILE = (
-    "no white tile was measured, so the radiance is relative and no BRDF can be fitted; "
-    "add references.white_tile to the protocol"
-)
-
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
@@ -41,19 +36,17 @@ class Fitted:
     def u_brdf(self, reduced: Reduced) -> FloatArray:
         """Standard uncertainty of every BRDF (N,), 1/sr: with the angles' share where fitted."""
         u = np.abs(reduced.brdf) * root_sum_square(list(reduced.parts.values()))
-        if self.chosen is not None:
+        if self.chosen is not None and reduced.has_brdf:
             u[self.used] = self.chosen.u_total
         return u
 
 
 def fit_run(reduced: Reduced, loaded: Loaded) -> Fitted:
     """Fit the sound points; what keeps a fit from being made is said, not raised."""
-    if loaded.protocol.references.white_tile is None:
-        return Fitted(None, reduced.sound, NO_TILE)
     acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
     try:
         choice = choose(measurements(reduced, loaded), acceptance, loaded.protocol.fit.models)
-    except NotDetermined as error:
+    except (NotDetermined, ValueError) as error:  # too few points, or none that shows light
         return Fitted(None, reduced.sound, str(error))
     return Fitted(choice, reduced.sound, choice.reason)
 
@@ -68,14 +61,20 @@ def cost_of(
 
 
 def measurements(reduced: Reduced, loaded: Loaded, without: Sequence[str] = ()) -> Measurements:
-    """The sound points as the fit sees them, `without` some parts of their uncertainty."""
+    """The sound points as the fit sees them, `without` some parts of their uncertainty.
+
+    Without a white tile they are relative: radiance over cos(theta_i), which goes as the BRDF as
+    long as the lamp gives the same irradiance at every setting, but for its cosine.
+    """
     keep = reduced.sound
     points = [p for p, kept in zip(reduced.points, keep, strict=True) if kept]
     own = [u[keep] for name, u in reduced.components.items() if name not in without]
     shared = (*reduced.shared, *reduced.shared_by_tile)
-    axes, brdf = loaded.rig.axes, reduced.brdf[keep]
+    theta_i_deg, axes = np.array([p.theta_i_deg for p in points]), loaded.rig.axes
+    value = reduced.brdf if reduced.has_brdf else reduced.radiance
+    brdf = value[keep] if reduced.has_brdf else value[keep] / np.cos(np.radians(theta_i_deg))
     return Measurements(
-        np.array([p.theta_i_deg for p in points]),
+        theta_i_deg,
         np.array([p.theta_r_deg for p in points]),
         np.array([p.dphi_deg for p in points]),
         brdf,
@@ -85,4 +84,5 @@ def measurements(reduced: Reduced, loaded: Loaded, without: Sequence[str] = ()) 
         u_theta_i_deg=axes.theta_i.u_deg,
         u_theta_r_deg=axes.theta_r.u_deg,
         u_dphi_deg=axes.dphi.u_deg,
+        relative=not reduced.has_brdf,
     )

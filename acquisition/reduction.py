@@ -62,9 +62,14 @@ class Reduced:
 
     @property
     def sound(self) -> NDArray[np.bool_]:
-        """Points that may enter a fit: measured against a tile, and nothing flagged."""
+        """Points that may enter a fit: nothing flagged, and measured against a tile if any was."""
         unflagged = np.array([not flags for flags in self.flags], dtype=bool)
-        return unflagged & np.isfinite(self.brdf)
+        return unflagged & np.isfinite(self.brdf if self.has_brdf else self.radiance)
+
+    @property
+    def has_brdf(self) -> bool:
+        """Whether a white tile ties the radiance to a BRDF, for one point at least."""
+        return bool(np.any(np.isfinite(self.brdf)))
 
 
 @dataclass(frozen=True, slots=True)

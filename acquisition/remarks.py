@@ -7,7 +7,6 @@ import numpy as np
 from acquisition.fitting import Fitted, cost_of
 from acquisition.reduction import DARK, NOISE, ROUNDING, Reduced
 from analysis.fit import FitResult
-from analysis.models import MODELS
 from analysis.report_data import Parameter
 from analysis.report_style import format_value
 from instrument.config import Loaded
@@ -18,7 +17,7 @@ Budget = tuple[tuple[str, float, float], ...]
 
 FEW_BITS = 8
 _UNITS = {"degrees": "°", "1": ""}
-_VERDICTS = {
+VERDICTS = {
     "adequate": "the simplest model that explains the data within their uncertainty",
     "none adequate": "the best of the models, but none explains the data within their uncertainty",
     "not identifiable": "agrees with the data, but they do not determine all of its parameters",
@@ -30,7 +29,7 @@ def headline(fitted: Fitted) -> str:
     """Which model was chosen and the verdict on it, in one sentence."""
     if fitted.choice is None or fitted.chosen is None:
         return f"No model was fitted: {fitted.reason}."
-    return f"{fitted.chosen.model}: {_VERDICTS[fitted.choice.verdict]}."
+    return f"{fitted.chosen.model}: {VERDICTS[fitted.choice.verdict]}."
 
 
 def value_text(parameter: Parameter) -> str:
@@ -51,7 +50,7 @@ def parameters_of(result: FitResult) -> tuple[Parameter, ...]:
             interval=result.intervals.get(p.name),
             unit=_UNITS.get(p.unit, p.unit),
         )
-        for p in MODELS[result.model].parameters
+        for p in result.problem.model.parameters
     )
 
 

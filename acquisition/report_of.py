@@ -10,7 +10,6 @@ from acquisition.fitting import Fitted
 from acquisition.reduction import Reduced
 from acquisition.remarks import Budget, parameters_of
 from analysis.fit import FitResult
-from analysis.models import MODELS
 from analysis.report_data import Candidate, Curve, ReportData
 from instrument.config import Loaded
 from instrument.geometry import FloatArray, Geometry
@@ -80,11 +79,9 @@ def candidates(fitted: Fitted) -> tuple[Candidate, ...]:
 
 
 def _curve(result: FitResult) -> Curve:
-    model = MODELS[result.model]
-
     def curve(theta_i_deg: float, dphi_deg: float, theta_r_deg: FloatArray) -> FloatArray:
         geometry = Geometry.from_degrees(theta_i=theta_i_deg, theta_r=theta_r_deg, dphi=dphi_deg)
-        return model.brdf(geometry, **result.values)
+        return result.brdf(geometry)
 
     return curve
 

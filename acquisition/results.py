@@ -14,7 +14,7 @@ from acquisition.fitting import fit_run
 from acquisition.reduction import Reduced, reduce
 from acquisition.remarks import budget, headline, notes, parameters_of
 from acquisition.report_of import report_data
-from analysis.fit_json import to_json
+from analysis.fit_json import nothing, to_json
 from analysis.report import write_report
 from analysis.report_data import Parameter
 from instrument.config import Loaded
@@ -27,11 +27,6 @@ COLUMNS = (
     *("theta_i_deg", "theta_r_deg", "dphi_deg", "radiance", "u_radiance", "brdf", "u_brdf"),
     *("window_pixels", "exposure_s", "frames", "flags", "time_utc"),
 )
-NOTHING_FITTED: dict[str, object] = {
-    "chosen": None,
-    "verdict": "not identifiable",
-    "candidates": [],
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +53,7 @@ def finish(record: Record, loaded: Loaded) -> Outcome:
         headline(fitted),
         () if fitted.chosen is None else parameters_of(fitted.chosen),
         notes(reduced, fitted, record, loaded),
-        NOTHING_FITTED if fitted.choice is None else to_json(fitted.choice),
+        nothing(fitted.reason) if fitted.choice is None else to_json(fitted.choice),
         record.folder / "report.html",
     )
     write_whole(record.folder / "measurements.csv", table(reduced, u_brdf))

@@ -50,7 +50,7 @@ def run_protocol(
 def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
     """Go on with a stopped run; a finished one is fitted and reported again."""
     with Record.open(folder) as record:
-        loaded = _as_used(record)
+        loaded = as_used(record)
         plan = make_plan(loaded)
         done = frozenset(reading.step for reading in record.readings())
         missing = [step for step in plan.steps if step.index not in done]
@@ -64,7 +64,7 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
 def report_run(folder: Path, as_json: bool) -> None:
     """Fit a run again and write its tables and report anew; touches no device."""
     with Record.open(folder) as record:
-        _finish(record, _as_used(record), as_json)
+        _finish(record, as_used(record), as_json)
 
 
 def show_plan(protocol_path: Path, rig_path: Path | None, as_json: bool) -> None:
@@ -158,7 +158,7 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _as_used(record: Record) -> Loaded:
+def as_used(record: Record) -> Loaded:
     """The run's own copies of protocol and rig; `InputError` when they are not as they were."""
     folder = record.folder
     loaded = load_protocol(folder / PROTOCOL_FILE, folder / RIG_FILE, check_model=check_model)

@@ -30,7 +30,7 @@ from analysis.models import MODELS
 from analysis.models.departure import departure
 from analysis.relative import NAME as RELATIVE_FACTOR
 from analysis.structure import failures, runs_probability
-from analysis.symmetry import Symmetry, symmetry
+from analysis.symmetry import Symmetry, p_text, symmetry
 from instrument.errors import NotDetermined
 from instrument.geometry import FloatArray
 
@@ -42,6 +42,9 @@ SAME_PREDICTION = 1 / 3
 # Such a cheaper method may leave this many times the chi2 that the better one leaves.
 SAME_CHI2 = 2.0
 MOST_RMS_RELATIVE = 0.05
+# Below this reduced chi2 the stated u is not the points' own scatter, but holds errors that they
+# share: what they then leave in a row is inside u.
+_NOT_SCATTER = 0.5
 # A first fit with so many times the best one's chi2 is not made better by averaging over the rig.
 _HOPELESS = 25.0
 
@@ -215,10 +218,13 @@ def _adequate(chosen: FitResult, measurements: Measurements) -> tuple[bool, str]
     by_chi2, by_runs = _probability(chosen), runs_probability(measurements, _kept(chosen))
     words = (
         f"{chosen.model}: chi2 {chosen.chi2:.4g} for {chosen.dof} degrees of freedom, "
-        f"p = {by_chi2:.2g}; runs of residuals of one sign, p = {by_runs:.2g} "
-        f"(rejected below {UNLIKELY:g}){set_aside}"
+        f"{p_text(by_chi2)}; runs of residuals of one sign, {p_text(by_runs)} "
+        f"(rejected below {UNLIKELY:g})"
     )
-    return min(by_chi2, by_runs) > UNLIKELY, words
+    if chosen.chi2 < _NOT_SCATTER * chosen.dof:
+        words += "; the stated u is more than the points scatter, so runs do not count"
+        by_runs = 1.0
+    return min(by_chi2, by_runs) > UNLIKELY, words + set_aside
 
 
 def _kept(result: FitResult) -> FloatArray:

@@ -21,6 +21,17 @@ def to_json(choice: Choice) -> dict[str, Any]:
     }
 
 
+def nothing(reason: str) -> dict[str, Any]:
+    """What is written where no model could be fitted."""
+    return {
+        "chosen": None,
+        "verdict": "not identifiable",
+        "reason": reason,
+        "symmetry": None,
+        "candidates": [],
+    }
+
+
 def _candidate(result: FitResult) -> dict[str, Any]:
     return {
         "model": result.model,

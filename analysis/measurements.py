@@ -8,7 +8,7 @@ need to know which is which.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -124,6 +124,12 @@ class Measurements:
             None if u_brdf is None else u,
             lamp_setting=same_setting(theta_i, dphi),
         )
+
+    def of(self, points: NDArray[np.bool_]) -> Measurements:
+        """Some of the points (N,), with the errors that they share."""
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        chosen = {name: array[points] for name, array in arrays.items() if array is not None}
+        return replace(self, **chosen, shared=tuple(error.of(points) for error in self.shared))
 
     @property
     def geometry(self) -> Geometry:

@@ -45,8 +45,13 @@ class Symmetry(NamedTuple):
         side = "lamp's" if self.asymmetry > 0 else "mirror"
         return (
             f"symmetry in theta_r: {self.says} ({self.pairs} pairs; {side} side brighter by "
-            f"{200 * abs(self.asymmetry):.2g} %, p = {self.probability:.2g})"
+            f"{200 * abs(self.asymmetry):.2g} %, {p_text(self.probability)})"
         )
+
+
+def p_text(probability: float) -> str:
+    """A probability as people read it; how small a very small one is says nothing."""
+    return f"p = {probability:.2g}" if probability >= 1e-9 else "p < 1e-9"
 
 
 def symmetry(m: Measurements, smooth: Brdf, noise: float) -> Symmetry:
