@@ -89,15 +89,18 @@ def _table(candidates: Sequence[FitResult], chosen: FitResult) -> Table:
     best_bic = min(c.bic for c in candidates)
     best_aicc = min(c.aicc for c in candidates)
     for c in sorted(candidates, key=lambda c: c.bic):
-        chi2 = "" if c.reduced_chi2 is None else f"{c.reduced_chi2:.2g}"
+        chi2 = "" if c.reduced_chi2 is None else _short(c.reduced_chi2)
         mark = "→" if c is chosen else "" if c.converged else "✗"
-        row = (f"{100 * c.rms_relative:.3g} %", chi2, _above(c.bic - best_bic))
-        table.add_row(f"{mark:1} {c.model}", str(c.x.size), *row, _above(c.aicc - best_aicc))
+        row = (f"{100 * c.rms_relative:.3g} %", chi2, _short(c.bic - best_bic))
+        table.add_row(f"{mark:1} {c.model}", str(c.x.size), *row, _short(c.aicc - best_aicc))
     return table
 
 
-def _above(difference: float) -> str:
-    return f"{difference:.1f}" if difference < 1e4 else f"{difference:.0e}"
+def _short(number: float) -> str:
+    """At most six characters."""
+    if abs(number) < 10:
+        return f"{number:.2f}"
+    return f"{number:.0f}" if number < 1e6 else f"{number:.0e}"
 
 
 def _notes(source: Source, chosen: FitResult) -> list[str]:

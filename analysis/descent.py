@@ -71,10 +71,11 @@ def descend(
     low: FloatArray,
     high: FloatArray,
     huber: float | None = None,
+    enough: float = 0.0,
 ) -> Minimum:
     """The minimum of `loss` of `residual(x)` (N,) with low <= x <= high (K,), down from `start`.
 
-    `jacobian(x)` is (N, K).
+    `jacobian(x)` is (N, K). A step that lowers chi2 by no more than `enough` is the last.
     """
     x, r = start, residual(start)
     chi2 = loss(r, huber)
@@ -84,14 +85,14 @@ def descend(
         if _no_way_down(slope, x, low, high, chi2, _FLAT):
             return Minimum(x, chi2, True, "no slope is left")
         step = _step(slope, x, low, high, damping)
-        if _promised(slope, step) <= _NOT_WORTH * chi2:
+        if _promised(slope, step) <= max(_NOT_WORTH * chi2, enough / 10):
             return Minimum(x, chi2, True, "chi2 has settled")
         new = np.clip(x + step, low, high)
         r = residual(new)
         reached = loss(r, huber)
         if reached < chi2:
             gain, x, chi2 = chi2 - reached, new, reached
-            if gain <= _SETTLED * chi2 or chi2 <= _NOTHING_LEFT * first:
+            if gain <= max(_SETTLED * chi2, enough) or chi2 <= _NOTHING_LEFT * first:
                 return Minimum(x, chi2, True, "chi2 has settled")
             damping = max(damping / 10, _LEAST_DAMPING)
             slope = _slope(r, jacobian(x), huber)

@@ -7,19 +7,20 @@ of its minimum: 3.84, the 95 % point of chi2 with one degree of freedom, gives 9
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
 
 from analysis.descent import Minimum
 from analysis.problem import Problem
+from instrument.geometry import FloatArray
 
 RISE_95 = 3.84
 
-# The search for an end starts no nearer than this part of the domain, widens by this factor, and
-# stops at this part of the distance.
-_NEAREST, _WIDEN, _RELATIVE = 1e-9, 3.0, 0.01
+# The search for an end begins no nearer than this part of the domain, widens by this factor, and
+# stops at this part of the distance; the other parameters' chi2 is known to this part of `rise`.
+_NEAREST, _WIDEN, _RELATIVE, _SETTLED = 1e-9, 3.0, 0.01, 1e-3
 
 
 def interval(
@@ -29,50 +30,51 @@ def interval(
 
     An end on a bound of the domain means that the data do not limit the parameter on that side.
     """
-    return (
-        _end(problem, best, index, float(problem.low[index]), rise),
-        _end(problem, best, index, float(problem.high[index]), rise),
-    )
+    profile = _Profile(problem, best, index, rise, {float(best.x[index]): best.x})
+    return profile.end(float(problem.low[index])), profile.end(float(problem.high[index]))
 
 
-def _end(problem: Problem, best: Minimum, index: int, bound: float, rise: float) -> float:
-    middle = float(best.x[index])
-    if middle == bound:
-        return bound
+@dataclass(frozen=True, slots=True)
+class _Profile:
+    """chi2 over one parameter, the others fitted anew; `solved` has their values so far."""
 
-    def excess(value: float) -> float:
+    problem: Problem
+    best: Minimum
+    index: int
+    rise: float
+    solved: dict[float, FloatArray]
+
+    def excess(self, value: float) -> float:
         """How far chi2 is above what is allowed, as a root: about linear in the distance."""
-        x = best.x.copy()
-        x[index] = value
-        chi2 = problem.chi2(x)
-        if chi2 - best.chi2 > rise:  # else fitting the others is not needed: it only lowers chi2
-            chi2 = problem.solve(x, [index]).chi2
-        return math.sqrt(max(chi2 - best.chi2, 0.0)) - math.sqrt(rise)
+        nearest = min(self.solved, key=lambda known: abs(known - value))
+        x = self.solved[nearest].copy()
+        x[self.index] = value
+        chi2 = self.problem.chi2(x)
+        if chi2 - self.best.chi2 > self.rise:  # else there is no need: it only lowers chi2
+            found = self.problem.solve(x, [self.index], enough=_SETTLED * self.rise)
+            self.solved[value], chi2 = found.x, found.chi2
+        return math.sqrt(max(chi2 - self.best.chi2, 0.0)) - math.sqrt(self.rise)
 
-    inner, outer = _bracket(excess, middle, bound, _first_step(problem, best, index, rise))
-    if inner == outer:
-        return bound
-    return float(brentq(excess, inner, outer, xtol=_RELATIVE * abs(outer - middle)))
+    def end(self, bound: float) -> float:
+        """The end towards a bound of the domain."""
+        middle = float(self.best.x[self.index])
+        if middle == bound or self.excess(bound) <= 0:
+            return bound
+        inner, outer = self._bracket(middle, bound)
+        return float(brentq(self.excess, inner, outer, xtol=_RELATIVE * abs(outer - middle)))
 
+    def _bracket(self, middle: float, bound: float) -> tuple[float, float]:
+        """A value inside the interval and one outside, which lies no further than the bound."""
+        inner, away = middle, math.copysign(self._first_step(), bound - middle)
+        while abs(away) < abs(bound - middle):
+            outer = middle + away
+            if self.excess(outer) > 0:
+                return inner, outer
+            inner, away = outer, away * _WIDEN
+        return inner, bound
 
-def _first_step(problem: Problem, best: Minimum, index: int, rise: float) -> float:
-    """The distance at which the parameter alone would raise chi2 by `rise`, roughly."""
-    domain = float(problem.high[index] - problem.low[index])
-    slope = float(np.linalg.norm(problem.jacobian(best.x, [index])))
-    return max(_NEAREST * domain, min(domain, math.sqrt(rise) / max(slope, 1e-300)))
-
-
-def _bracket(
-    excess: Callable[[float], float], middle: float, bound: float, step: float
-) -> tuple[float, float]:
-    """A value inside the interval and one outside; the bound twice where that is inside."""
-    inner, away = middle, math.copysign(step, bound - middle)
-    while True:
-        outer = middle + away
-        if abs(away) >= abs(bound - middle):
-            outer = bound
-        if excess(outer) > 0:
-            return inner, outer
-        if outer == bound:
-            return bound, bound
-        inner, away = outer, away * _WIDEN
+    def _first_step(self) -> float:
+        """The distance at which the parameter alone would raise chi2 by `rise`, roughly."""
+        domain = float(self.problem.high[self.index] - self.problem.low[self.index])
+        slope = float(np.linalg.norm(self.problem.jacobian(self.best.x, [self.index])))
+        return max(_NEAREST * domain, min(domain, math.sqrt(self.rise) / max(slope, 1e-300)))

@@ -66,8 +66,11 @@ class Problem:
         columns = [self.gain * slopes[parameters[i].name] for i in indices]
         return self.covariance.whiten(np.stack(columns, axis=1))
 
-    def solve(self, start: FloatArray, held: Iterable[int] = ()) -> Minimum:
-        """The minimum reached from `start`, with the `held` parameters left where they are."""
+    def solve(self, start: FloatArray, held: Iterable[int] = (), enough: float = 0.0) -> Minimum:
+        """The minimum reached from `start`, with the `held` parameters left where they are.
+
+        A step that lowers chi2 by no more than `enough` is the last.
+        """
         held = frozenset(held)
         free = [i for i in range(start.size) if i not in held]
         if not free:
@@ -85,6 +88,7 @@ class Problem:
             self.low[free],
             self.high[free],
             self.huber,
+            enough,
         )
         return found._replace(x=full(found.x))
 

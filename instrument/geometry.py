@@ -31,6 +31,8 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 
+_RADIANS = np.pi / 180  # a product with it is np.radians to the last bit, in a fifth of the time
+
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
@@ -91,17 +93,17 @@ class Geometry:
     @property
     def theta_i(self) -> FloatArray:
         """Angle of incidence in radians, for numerical kernels."""
-        return np.radians(self.theta_i_deg)
+        return self.theta_i_deg * _RADIANS
 
     @property
     def theta_r(self) -> FloatArray:
         """View angle in radians, for numerical kernels."""
-        return np.radians(self.theta_r_deg)
+        return self.theta_r_deg * _RADIANS
 
     @property
     def cos_dphi(self) -> FloatArray:
         """Cosine of the azimuth difference: 1 towards the lamp, -1 on the mirror side."""
-        return np.cos(np.radians(self.dphi_deg))
+        return np.cos(self.dphi_deg * _RADIANS)
 
 
 def _require(name: str, value: FloatArray, low: float, high: float) -> None:
@@ -109,7 +111,7 @@ def _require(name: str, value: FloatArray, low: float, high: float) -> None:
     if np.any(wrong):
         first = value[wrong].flat[0]
         allowed = f"{low:g} to {high:g} degrees" if np.isfinite(low) else "finite degrees"
-        raise ValueError(f"{name} = {first:g} degrees; allowed: {allowed}")
+        raise ValueError(f"{name} = {first:.12g} degrees; allowed: {allowed}")
 
 
 def camera_direction(theta_r_deg: ArrayLike) -> FloatArray:

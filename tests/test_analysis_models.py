@@ -195,7 +195,7 @@ def test_grazing_directions_give_numbers(name: str) -> None:
     [
         ({"albedo": 0.5}, "sigma_deg"),
         ({"albedo": 0.5, "sigma_deg": 61}, "61 degrees; allowed: 0 to 60 degrees"),
-        ({"albedo": -0.1, "sigma_deg": 20}, r"albedo = -0.1 1; allowed: 0 to 1"),
+        ({"albedo": -0.1, "sigma_deg": 20}, r"albedo = -0.1; allowed: 0 to 1"),
         ({"albedo": math.nan, "sigma_deg": 20}, "albedo = nan"),
         ({"albedo": 0.5, "sigma_deg": math.inf}, "sigma_deg = inf"),
         ({"albedo": 0.5, "sigma_deg": 20, "ks": 0.1}, "no parameter ks"),

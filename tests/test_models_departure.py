@@ -113,7 +113,7 @@ def test_what_is_not_known_fails() -> None:
     ("arguments", "message"),
     [
         (("wolff", 0.5, 10.0), "form = 'wolff'; allowed: lambert, oren_nayar_qualitative, oren_"),
-        (("lambert", 1.5, 10.0), "albedo = 1.5 1; allowed: 0 to 1"),
+        (("lambert", 1.5, 10.0), "albedo = 1.5; allowed: 0 to 1"),
         (("oren_nayar", 0.5, 61.0), "sigma_deg = 61 degrees; allowed: 0 to 60 degrees"),
     ],
 )

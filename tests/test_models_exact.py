@@ -70,13 +70,26 @@ def scattered(count: int, limit: float = 85.0) -> Geometry:
     return Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
 
 
+def nearly_special(count: int) -> Geometry:
+    """Near 85 degrees, and 1e-10 to 10 degrees from equal angles, the plane, or square to it."""
+    random = np.random.default_rng(8)
+
+    def small() -> FloatArray:
+        return np.asarray(10 ** random.uniform(-10, 1, count))
+
+    theta_i = 85 - small()
+    theta_r = np.where(random.random(count) < 0.7, np.abs(theta_i - small()), small())
+    dphi = np.abs(random.choice([0, 90, 180], count) - small())
+    return Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
+
+
 @pytest.mark.parametrize(("rule", "accuracy"), [(COARSE, 1e-4), (RULE, 1e-6), (FINE, 1e-8)])
 def test_the_rules_keep_what_they_promise(rule: Rule, accuracy: float) -> None:
-    geometry = scattered(600)
-    for sigma in (0.5, 5.0, 20.0, 60.0):
-        best = oren_nayar_exact_brdf(geometry, 1.0, sigma, Rule(30, 18, 48))
-        got = oren_nayar_exact_brdf(geometry, 1.0, sigma, rule)
-        np.testing.assert_allclose(got, best, rtol=accuracy)
+    for geometry in (scattered(400), nearly_special(400)):
+        for sigma in (0.5, 5.0, 20.0, 60.0):
+            best = oren_nayar_exact_brdf(geometry, 1.0, sigma, Rule(30, 18, 48))
+            got = oren_nayar_exact_brdf(geometry, 1.0, sigma, rule)
+            np.testing.assert_allclose(got, best, rtol=accuracy)
     forget()
 
 

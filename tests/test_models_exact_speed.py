@@ -7,7 +7,7 @@ rule    accuracy  nodes a geometry  first evaluation  another sigma
 ======  ========  ================  ================  =============
 COARSE  1e-4      28                60 us             0.45 us
 RULE    1e-6      40                96 us             0.55 us
-FINE    1e-8      75                320 us            1.2 us
+FINE    1e-8      75                360 us            1.2 us
 ======  ========  ================  ================  =============
 """
 
@@ -73,13 +73,13 @@ def test_a_first_evaluation_costs_at_most_that_of_two_thousand_functional_ones(
     check(everywhere, 20.0)
 
 
-def test_another_sigma_costs_at_most_that_of_fifteen_functional_ones(everywhere: Geometry) -> None:
+def test_another_sigma_costs_at_most_that_of_twelve_functional_ones(everywhere: Geometry) -> None:
     sigmas = iter(np.linspace(5, 55, 40))
     EXACT.brdf(everywhere, albedo=0.8, sigma_deg=20.0)
 
     def again() -> None:
         EXACT.brdf(everywhere, albedo=0.8, sigma_deg=float(next(sigmas)))
 
-    assert seconds(again, 15) < 15 * functional(everywhere)
+    assert seconds(again, 15) < 12 * functional(everywhere)
     check(everywhere, 33.0)
     forget()

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from analysis.models.fresnel import (
+    amplitudes,
     polarised,
     reflectances,
     transmittance,
     transmittance_slope,
+    transmittance_slope_by_cosine,
     unpolarised,
     wolff_polynomial,
 )
@@ -39,6 +41,26 @@ def test_the_printed_equations_to_1e_12(index: complex, h: float) -> None:
     theta = np.radians(DEGREES)
     expected = [printed(t, index, h) for t in theta]
     np.testing.assert_allclose(polarised(theta, index, h), expected, rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("index", [1.01, 1.5, 10.0, *METALS])
+def test_the_amplitudes_as_printed(index: complex) -> None:
+    theta = np.radians(DEGREES)
+    for t, para, perp in zip(theta, *amplitudes(theta, index), strict=True):
+        with mp.workdps(40):
+            Y2, c = mp.mpmathify(index) ** 2, mp.cos(mp.mpf(float(t)))
+            q = mp.sqrt(Y2 - 1 + c**2)
+            expected = complex((Y2 * c - q) / (Y2 * c + q)), complex((c - q) / (c + q))
+        assert (para, perp) == pytest.approx(expected, rel=1e-12, abs=1e-13)
+
+
+def test_a_real_index_has_the_phases_of_a_weak_absorber() -> None:
+    # n - ik with k -> 0, also in total reflection, where the amplitudes are complex
+    theta = np.radians([10.0, 60.0, 85.0])
+    both = amplitudes(theta, 1 / 1.5), amplitudes(theta, 1 / 1.5 - 1e-14j)
+    for real, absorbing in zip(*both, strict=True):
+        np.testing.assert_allclose(real, absorbing, rtol=1e-12)
+        assert np.all(np.abs(real.imag[1:]) > 0.1)
 
 
 @pytest.mark.parametrize("n", [1.33, 1.5, 2.0])
@@ -88,6 +110,16 @@ def test_total_internal_reflection_is_exactly_1() -> None:
     assert unpolarised(critical - 1e-3, 1 / 1.5) < 0.9
 
 
+@pytest.mark.parametrize("n", [0.2, 1 / 1.5, 1 - 1e-9])
+def test_at_the_critical_angle_it_is_as_good_as_the_angle(n: float) -> None:
+    # F starts as a square root: near it, the last digit of theta matters more than ours do.
+    for off in (0.0, 1e-15, 1e-12, 1e-9, 1e-7):
+        t = math.asin(n) * (1 - off)
+        either = [printed(x, n, 0.5) for x in (math.nextafter(t, 0), t, math.nextafter(t, 2))]
+        allowed = 4 * max(abs(e - either[1]) for e in either) + 1e-12
+        assert unpolarised(t, n) == pytest.approx(either[1], rel=0, abs=allowed)
+
+
 def test_brewster_s_angle_lets_all_of_one_polarisation_through() -> None:
     para, perp = reflectances(np.arctan(1.5), 1.5)
     assert para < 1e-30
@@ -123,6 +155,21 @@ def test_the_slope_by_n(n: float) -> None:
         assert transmittance_slope(t, n) == pytest.approx(expected, rel=1e-10, abs=1e-13)
 
 
+@pytest.mark.parametrize("n", [1.0, 1.001, 1.5, 3.0])
+def test_the_slope_by_the_cosine(n: float) -> None:
+    for t in np.radians([0.0, 20, 60, 80, 89]):
+
+        def transmitted(c: mp.mpf) -> mp.mpf:
+            n2 = mp.mpf(n) ** 2
+            q = mp.sqrt(n2 - 1 + c**2)
+            return 2 * c * q * (1 / (c + q) ** 2 + n2 / (n2 * c + q) ** 2)
+
+        with mp.workdps(40):
+            expected = float(mp.diff(transmitted, mp.cos(mp.mpf(float(t)))))
+        found = transmittance_slope_by_cosine(t, n)
+        assert found == pytest.approx(expected, rel=1e-10, abs=1e-13)
+
+
 def test_wolff_s_polynomial_has_the_stated_error() -> None:
     theta = np.radians(np.linspace(0, 90, 9001))
     error = wolff_polynomial(theta) - unpolarised(theta, 1.5)
@@ -145,3 +192,9 @@ def test_wrong_input_is_named() -> None:
         unpolarised(0.0, -1.0)
     with pytest.raises(ValueError, match=r"n = 0\.5; allowed: 1 or more"):
         transmittance(0.0, 0.5)
+    with pytest.raises(ValueError, match=r"epsilon = -1; allowed: 0 or more"):
+        wolff_polynomial(0.0, -1.0)
+    for function in (lambda t: unpolarised(t, 1.5), lambda t: transmittance(t, 1.5)):
+        for wrong in (-0.1, 1.6, math.nan):
+            with pytest.raises(ValueError, match=f"theta = {wrong} radians; allowed: 0 to pi/2"):
+                function([0.3, wrong])

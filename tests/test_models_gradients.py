@@ -23,7 +23,8 @@ RECIPROCAL = [name for name in NAMES if name != "wolff"]
 # Reflect no more than they receive, whatever their parameters.
 CONSERVING = {
     "lambert": {"albedo": 1.0},
-    "oren_nayar_qualitative": {"albedo": 1.0, "sigma_deg": 40.0},
+    "minnaert": {"albedo": 1.0, "k": 1.5},
+    "torrance_sparrow_lobe": {"ks": 1.0, "lobe_sigma_deg": 30.0},
     "eon": {"albedo": 1.0, "roughness": 1.0},
     "ggx": {"f0": 1.0, "alpha": 0.5},
     "wolff": {"single_scattering_albedo": 1.0, "n": 1.5},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.models import MODELS
-from analysis.models.beckmann_spizzichino import rough_lobe_brdf
+from analysis.models.beckmann_spizzichino import lobe_brdf, rough_lobe_brdf
 from analysis.models.roughness import (
     curvature_radius,
     has_gaussian_lobe,
@@ -238,3 +239,18 @@ def test_wrong_roughness_is_named() -> None:
         slope_sigma_deg(1.0, 0.0)
     with pytest.raises(ValueError, match=r"sigma_deg = 70 degrees; allowed: 0 to below 63\.6"):
         height_over_length(70.0)
+    with pytest.raises(ValueError, match="sigma_h = 0 wavelengths; allowed: 1e-100 or more"):
+        rough_lobe_brdf(scan(10.0, 10.0), 1.0, 0.0, 10.0)
+    with pytest.raises(ValueError, match="sigma_h = -1 wavelengths; allowed: 0 or more"):
+        lobe_brdf(scan(10.0, 10.0), 1.0, -1.0, 10.0)
+
+
+@pytest.mark.parametrize("framework", [moving_sensor, moving_source])
+def test_wrong_widths_are_named(framework: Callable[..., FloatArray]) -> None:
+    for wrong in (-5.0, 0.0, math.nan):
+        with pytest.raises(ValueError, match=f"^sigma_deg = {wrong:g} degrees; allowed: 0.5 to 60"):
+            framework(scan(10.0, 10.0), 1.0, 1.0, wrong, 1.0, 1.0)
+        with pytest.raises(
+            ValueError, match=f"^spike_width_deg = {wrong:g} degrees; allowed: 0.05"
+        ):
+            framework(scan(10.0, 10.0), 1.0, 1.0, 10.0, 1.0, wrong)

@@ -13,8 +13,14 @@ from scipy.integrate import IntegrationWarning, quad
 
 from analysis.models import MODELS
 from analysis.models.chandrasekhar import characteristic_roots, h_exact, h_order, log_h_slope
-from analysis.models.fresnel import unpolarised
-from analysis.models.wolff import TRANSITION_DEG, internal_return, roughness_share
+from analysis.models.fresnel import unpolarised, wolff_polynomial
+from analysis.models.wolff import (
+    TRANSITION_DEG,
+    internal_return,
+    roughness_share,
+    wolff_brdf,
+    wolff_oren_nayar_brdf,
+)
 from instrument.geometry import FloatArray, Geometry
 
 ALBEDOS = [0.0, 0.3, 0.9, 0.9999, 1 - 1e-10, 1.0]
@@ -167,6 +173,55 @@ def test_the_series_in_ln_mu_is_as_good_as_the_integrals(rho: float, n: float) -
     T = 1 - unpolarised(np.radians(theta), n)
     expected = rho / (4 * np.pi * n * n) * H * H / (2 * mu) / (1 - K) * T * T
     np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("n", [1.0001, 1.2, 1.5, 2.9])
+@pytest.mark.parametrize("rho", [0.3, 0.95, 1.0])
+def test_the_slope_by_the_index(rho: float, n: float) -> None:
+    geometry = Geometry.from_degrees(
+        theta_i=np.array([0.0, 20, 50, 80, 89])[:, np.newaxis], theta_r=[0.0, 35, 60, 85, 89.5]
+    )
+    h = 2e-3 * (n - 1)
+    f = [
+        MODELS["wolff"].brdf(geometry, single_scattering_albedo=rho, n=n + k * h)
+        for k in (-2, -1, 1, 2)
+    ]
+    expected = (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * h)
+    found = MODELS["wolff"].gradient(geometry, single_scattering_albedo=rho, n=n)["n"]
+    np.testing.assert_allclose(found, expected, rtol=2e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize("epsilon", [0.0, 0.07, 0.2])
+def test_equation_7_and_9_with_the_polynomial(epsilon: float) -> None:
+    # F of theta_i and of theta_r: the way out transmits as the way in
+    geometry = Geometry.from_degrees(theta_i=[0.0, 50, 70, 90], theta_r=[0.0, 50, 70, 30], dphi=90)
+    share = np.ones(4)
+    for theta in (geometry.theta_i, geometry.theta_r):
+        F = ((2 * theta / np.pi) ** 5 + epsilon) / (1 + epsilon)
+        np.testing.assert_allclose(wolff_polynomial(theta, epsilon), F, rtol=1e-13)
+        share = share * (1 - F)
+    bare = wolff_brdf(geometry, 0.9, 1.5) / (
+        (1 - unpolarised(geometry.theta_i, 1.5)) * (1 - unpolarised(geometry.theta_r, 1.5)) + 1e-300
+    )
+    found = wolff_brdf(geometry, 0.9, 1.5, epsilon)
+    np.testing.assert_allclose(found[:3], (bare * share)[:3], rtol=1e-12)
+    assert found[3] == pytest.approx(0, abs=1e-15)
+    smooth = wolff_oren_nayar_brdf(geometry, 0.6, 0.0, 1.5, epsilon)
+    np.testing.assert_allclose(smooth, 0.6 / np.pi * share, rtol=1e-12, atol=1e-16)
+    if epsilon == 0.07:  # as `wolff_brdf` says
+        darker = found[:3] / wolff_brdf(geometry, 0.9, 1.5)[:3]
+        np.testing.assert_allclose(darker, [0.95, 0.88, 0.65], atol=5e-3)
+
+
+def test_wrong_cosines_and_albedos_are_named() -> None:
+    for function in (lambda x: h_exact(x, 0.5), lambda x: h_order(x, 0.5, 3)):
+        for wrong in (-0.1, 1.5, math.nan):
+            with pytest.raises(ValueError, match=f"mu = {wrong}; allowed: 0 to 1"):
+                function([0.3, wrong])
+    with pytest.raises(ValueError, match=r"albedo = 1\.5; allowed: 0 to 1"):
+        h_order(0.5, 1.5, 3)
+    with pytest.raises(ValueError, match="order = 0; allowed: 1 or more"):
+        h_order(0.5, 0.5, 0)
 
 
 def reflected(theta_i: FloatArray, rho: float, n: float) -> FloatArray:

@@ -126,6 +126,21 @@ def test_open_facets_exchange_pi_times_one_minus_cosine() -> None:
     np.testing.assert_allclose(factor, np.pi * (1 - np.cos(theta_a)), atol=1e-14)
 
 
+def test_one_facet_gives_numbers_at_the_ends_of_the_domain() -> None:
+    random = np.random.default_rng(8)
+    ends = np.array([0.0, 1e-300, 1e-9, 0.7, np.pi / 2 - 1e-9, np.pi / 2])
+    theta_i, theta_r, theta_a = random.choice(ends, (3, 3000))
+    phi_i, phi_r, phi_a = random.choice([0.0, np.pi / 2, np.pi, 2.0], (3, 3000))
+    towards = Directions(theta_i, phi_i, theta_r, phi_r)
+    with np.errstate(all="raise", under="ignore"):
+        found = [attenuation(towards, theta_a, phi_a), critical_angle(theta_i, theta_a)]
+        widths = (f(towards, theta_a, phi_a) for f in (masked_width, shadowed_width))
+        found += [interreflection_factor(*widths, theta_a)]
+        found += unidirectional_single_slope(towards, theta_a, phi_a)
+        found += isotropic_single_slope(theta_i, theta_r, phi_r, theta_a)
+    assert all(np.all(np.isfinite(value) & (value >= 0)) for value in found)
+
+
 # The isotropic single-slope surface
 
 
@@ -230,6 +245,37 @@ def test_the_isotropic_surface_is_reciprocal() -> None:
     two = isotropic_single_slope(theta_r, theta_i, dphi, theta_a, 24)
     np.testing.assert_allclose(one.direct, two.direct, rtol=1e-12, atol=1e-13)
     np.testing.assert_allclose(one.twice, two.twice, rtol=1e-9, atol=1e-11)
+
+
+def test_the_critical_angles_part_the_facets_as_in_table_2() -> None:
+    for theta_i, theta_r, theta_a, phi_r, _ in random_cavities(200, 7):
+        towards = Directions(*(np.array(x) for x in (theta_i, 0.0, theta_r, phi_r)))
+        slope, azimuth = np.array(theta_a), np.linspace(0, 2 * np.pi, 181)
+        for theta, phi, hidden in (
+            (theta_i, 0.0, shadowed_width(towards, slope, azimuth + np.pi)),
+            (theta_r, phi_r, masked_width(towards, slope, azimuth)),
+        ):
+            critical = critical_angle(np.array(theta), slope)
+            off = np.abs(np.angle(np.exp(1j * (azimuth - phi))))  # from the direction's azimuth
+            within, opposite = off < critical - 1e-9, off > np.pi - critical + 1e-9
+            between = (off > critical + 1e-9) & (off < np.pi - critical - 1e-9)
+            assert np.all((hidden[within] > 0) & (hidden[within] < 1))
+            assert np.all(hidden[between] == 0)
+            assert np.all(hidden[opposite] == 1)
+
+
+@pytest.mark.parametrize("which", ["theta_i", "theta_r", "theta_a"])
+@pytest.mark.parametrize("wrong", [-0.1, 1.6, math.nan])
+def test_angles_outside_the_hemisphere_are_refused(which: str, wrong: float) -> None:
+    angles = {"theta_i": np.array(0.5), "theta_r": np.array(0.6), "theta_a": np.array(0.7)}
+    theta_i, theta_r, theta_a = (angles | {which: np.array(wrong)}).values()
+    towards = Directions(theta_i, UP, theta_r, np.array(1.0))
+    words = f"{which} = {wrong:.12g} radians; allowed: 0 to pi/2"
+    with pytest.raises(ValueError, match=words):
+        isotropic_single_slope(theta_i, theta_r, np.array(1.0), theta_a)
+    for one_facet in (attenuation, unidirectional_single_slope):
+        with pytest.raises(ValueError, match=words):
+            one_facet(towards, theta_a, UP)
 
 
 def test_too_few_nodes_are_refused() -> None:

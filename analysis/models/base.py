@@ -68,9 +68,13 @@ class Parameter:
 
     def check(self, value: float) -> float:
         """Return the value as a float, or raise `ValueError` when it is not in the domain."""
-        value = float(value)
+        try:
+            value = float(value)
+        except (TypeError, ValueError):
+            raise ValueError(f"{self.name} = {value!r}; allowed: {self.domain}") from None
         if not self.low <= value <= self.high:  # also false for NaN
-            raise ValueError(f"{self.name} = {value:g} {self.unit}; allowed: {self.domain}")
+            given = f"{self.name} = {value:.12g} {self.unit}".removesuffix(" 1")
+            raise ValueError(f"{given}; allowed: {self.domain}")
         return value
 
     @property

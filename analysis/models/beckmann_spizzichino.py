@@ -22,7 +22,7 @@ import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity
 from analysis.models.limits import either_grazes, held
-from analysis.models.roughness import curvature_radius, unshadowed_deg
+from analysis.models.roughness import check_lengths, curvature_radius, unshadowed_deg
 from analysis.models.specular import off_mirror2
 from instrument.geometry import FloatArray, Geometry
 
@@ -58,7 +58,7 @@ def lobe_slopes(
     factor = _before_the_sum(geometry, correlation_length)
     by_ln_g = poisson_sum(g, q, lambda m, g, _: (m - g) / m)
     by_ln_t2 = poisson_sum(g, q, lambda m, _, q: (1 - q / m) / m)
-    per_sigma = scale * 2 / sigma_h if sigma_h else 0.0  # f rises as sigma_h^2
+    per_sigma = scale * 2 / sigma_h if sigma_h > 1e-150 else 0.0  # f rises as sigma_h^2
     return {
         "scale": factor * poisson_sum(g, q, _per_m),
         "sigma_h": per_sigma * factor * by_ln_g,
@@ -102,6 +102,8 @@ def rough_lobe_brdf(
     With tan α₀ = 2σ_h/T it is geometrical optics: scale P/(4 cosθ_i cosθ_r), P the density
     exp(-tan²α/tan²α₀)/(π tan²α₀ cos⁴α) of mirrors, so that `scale` is a Fresnel factor.
     """
+    if sigma_h < 1e-100:  # its square is 1/0
+        raise ValueError(f"sigma_h = {sigma_h:g} wavelengths; allowed: 1e-100 or more where g ≫ 1")
     g, q = optical_roughness(geometry, sigma_h), _exponent(geometry, correlation_length)
     with np.errstate(under="ignore"):
         return scale * _before_the_sum(geometry, correlation_length) * np.exp(-q / g) / g
@@ -127,6 +129,7 @@ def spike_brdf(
 
 def optical_roughness(geometry: Geometry, sigma_h: float) -> FloatArray:
     """g: 1991, equation (19)."""
+    check_lengths(sigma_h)
     return np.square(K * sigma_h * (np.cos(geometry.theta_i) + np.cos(geometry.theta_r)))
 
 
@@ -152,6 +155,7 @@ def geometric_factor(geometry: Geometry) -> FloatArray:
 
 def _exponent(geometry: Geometry, correlation_length: float) -> FloatArray:
     """q = v_xy² T²/4, so that a term of the sum has e^{-q/m}."""
+    check_lengths(0.0, correlation_length)
     return (K * correlation_length) ** 2 / 4 * off_mirror2(geometry)
 
 

@@ -58,10 +58,8 @@ def log_h_slope(mu: ArrayLike, albedo: float) -> FloatArray:
 
 def _transform(mu: ArrayLike, strength: FloatArray) -> FloatArray:
     """-(mu/pi) times the sum of strength / (cos^2 t + mu^2 sin^2 t) over the nodes t."""
-    mu = np.asarray(mu, dtype=np.float64)
+    mu = _cosine(mu)
     flat = mu.ravel()
-    if not np.all((flat >= 0) & (flat <= 1)):
-        raise ValueError(f"mu from {flat.min():g} to {flat.max():g}; allowed: 0 to 1")
     integral = np.empty_like(flat)
     for start in range(0, flat.size, _CHUNK):
         m = flat[start : start + _CHUNK, np.newaxis]
@@ -75,9 +73,9 @@ def h_order(mu: ArrayLike, albedo: float, order: int) -> FloatArray:
 
     i and a run from 1 to N (errata: 1998 mixes n and N); mu_i are the positive zeros of P_2N.
     """
-    mu = np.asarray(mu, dtype=np.float64)[..., np.newaxis]
+    mu = _cosine(mu)[..., np.newaxis]
     mu_i, _ = _gauss(order)
-    kappa = characteristic_roots(_in_unit("albedo", albedo), order)
+    kappa = characteristic_roots(albedo, order)
     # The largest 1/mu_i over the largest kappa: each factor is near 1, and none overflows.
     result: FloatArray = np.prod((1 + mu / mu_i[::-1]) / (1 + kappa * mu), axis=-1)
     return result
@@ -90,6 +88,7 @@ def characteristic_roots(albedo: float, order: int) -> FloatArray:
     Their squares are the eigenvalues of diag(1/mu_j^2) - rho z z^T with z_j = sqrt(a_j)/mu_j. The
     smallest comes from prod kappa^2 = (1 - rho) prod 1/mu_j^2: exactly 0 at rho = 1.
     """
+    _in_unit("albedo", albedo)
     mu_j, a_j = _gauss(order)
     z = np.sqrt(a_j) / mu_j
     squares = np.linalg.eigvalsh(np.diag(mu_j**-2) - albedo * np.outer(z, z))
@@ -119,6 +118,14 @@ def _logarithms(albedo: float) -> FloatArray:
 def _one_minus_t_cot_t() -> FloatArray:
     series = np.polynomial.polynomial.polyval(_T * _T, (0.0, *_SERIES))
     return np.asarray(np.where(_T < 0.1, series, 1 - _T * np.tan(_E)))
+
+
+def _cosine(mu: ArrayLike) -> FloatArray:
+    mu = np.asarray(mu, dtype=np.float64)
+    fine = (mu >= 0) & (mu <= 1)
+    if not np.all(fine):
+        raise ValueError(f"mu = {mu[~fine].flat[0]:.12g}; allowed: 0 to 1")
+    return mu
 
 
 def _in_unit(name: str, value: float) -> float:

@@ -42,8 +42,9 @@ def oren_nayar_qualitative_brdf(
 
     `sigma_deg` is the standard deviation of the facets' slope angle. No masking of the far slope,
     no interreflection; a `constant` of 0.57 partly makes up for the latter (footnote 11). Never
-    negative; reciprocal; Lambert's at sigma = 0. As printed it grows without limit where lamp and
-    camera both graze the surface on one side (tan beta).
+    negative; reciprocal; Lambert's at sigma = 0. At albedo 1 it reflects up to 1.015 of the light
+    (sigma 11 degrees, grazing incidence). As printed it grows without limit where lamp and camera
+    both graze the surface on one side (tan beta).
     """
     sigma2 = math.radians(sigma_deg) ** 2
     A = 1 - 0.5 * sigma2 / (sigma2 + constant)
@@ -88,8 +89,10 @@ def oren_nayar_brdf(geometry: Geometry, albedo: float, sigma_deg: float) -> Floa
 
     `sigma_deg` is the standard deviation of the facets' slope angle. Direct light (33) and light
     of two bounces (34), both fitted by their authors to numerical integrals. Reciprocal;
-    Lambert's at sigma = 0. As printed it is negative far forward at high roughness (60 degrees,
-    from 77/77 degrees on), and grows without limit where lamp and camera both graze the surface.
+    Lambert's at sigma = 0. At albedo 1 it reflects up to 1.051 of the light (sigma 17 degrees,
+    grazing incidence; 1.013 up to 75 degrees). As printed it is negative far forward at high
+    roughness (60 degrees, from 77/77 degrees on), and grows without limit where lamp and camera
+    both graze the surface.
     """
     return (albedo / np.pi) * _relative_to_lambert(geometry, albedo, sigma_deg)
 

@@ -20,6 +20,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.models.limits import polar
 from instrument.geometry import FloatArray
 
 ComplexArray = NDArray[np.complex128]
@@ -34,9 +35,10 @@ def amplitudes(theta: ArrayLike, index: ArrayLike) -> tuple[ComplexArray, Comple
         Y^2 cos - q = (Y^2 - 1)(Y^2 cos^2 - sin^2) / (Y^2 cos + q)      (12)
         cos - q     = (1 - Y^2) / (cos + q)                             (13)
     """
-    c, Y = np.cos(np.asarray(theta)), _checked(index).astype(np.complex128)
-    Y2_1 = (Y - 1) * (Y + 1)
-    q = np.sqrt(Y2_1 + c * c)
+    theta, Y = polar("theta", theta), _checked(index)
+    c, s, Y2_1 = np.cos(theta), np.sin(theta), (Y - 1) * (Y + 1)
+    q2 = np.where(s < c, (Y - s) * (Y + s), Y2_1 + c * c)  # near the critical angle it is small
+    q = np.conj(np.sqrt(np.conj(q2) + 0j))  # a real index is n - 0i
     Y2 = Y * Y
     para = Y2_1 * ((Y2 + 1) * c * c - 1) / np.square(Y2 * c + q)
     perp = -Y2_1 / np.square(c + q)
@@ -46,7 +48,9 @@ def amplitudes(theta: ArrayLike, index: ArrayLike) -> tuple[ComplexArray, Comple
 def reflectances(theta: ArrayLike, index: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Energy reflectances (F'_para, F'_perp) = |F|^2: 1991, equation (41). 1 in total reflection.
 
-    `theta` in radians, 0 to pi/2; `index` real or complex; both broadcast.
+    `theta` in radians, 0 to pi/2; `index` real or complex; both broadcast. To 1e-12, but for a
+    ten-millionth of a radian about the critical angle: |F|^2 starts there as a square root, and
+    the rounding of theta itself changes more.
     """
     para, perp = (_squared_modulus(f) for f in amplitudes(theta, index))
     total = np.isreal(index) & (np.sin(theta) > np.real(index))
@@ -93,12 +97,31 @@ def transmittance_slope(theta: ArrayLike, n: ArrayLike) -> FloatArray:
     d(F_para)/dn = 2 n c (2 q^2 - n^2) / (q (n^2 c + q)^2).
     """
     c, n, q = _cosines(theta, n)
-    n2, perp_side, para_side = n * n, c + q, n * n * c + q
+    d_perp = -2 * n * c / (q * np.square(c + q))
+    d_para = 2 * n * c * (2 * q * q - n * n) / (q * np.square(n * n * c + q))
+    return _chained(c, n, q, d_perp, d_para)
+
+
+def transmittance_slope_by_cosine(theta: ArrayLike, n: ArrayLike) -> FloatArray:
+    """Derivative of `transmittance` by cos(theta).
+
+    By dq/dc = c/q: d(F_perp)/dc = 2 (n^2 - 1) / (q (c + q)^2) and
+    d(F_para)/dc = 2 n^2 (n^2 - 1) / (q (n^2 c + q)^2).
+    """
+    c, n, q = _cosines(theta, n)
+    n2, n2_1 = n * n, (n - 1) * (n + 1)
+    d_perp = 2 * n2_1 / (q * np.square(c + q))
+    d_para = 2 * n2 * n2_1 / (q * np.square(n2 * c + q))
+    return _chained(c, n, q, d_perp, d_para)
+
+
+def _chained(
+    c: FloatArray, n: FloatArray, q: FloatArray, d_perp: FloatArray, d_para: FloatArray
+) -> FloatArray:
+    """-(F_perp d(F_perp) + F_para d(F_para)): the derivative of 1 - (F_perp^2 + F_para^2)/2."""
     n2_1 = (n - 1) * (n + 1)
-    perp = -n2_1 / np.square(perp_side)
-    para = n2_1 * ((n2 + 1) * c * c - 1) / np.square(para_side)
-    d_perp = -2 * n * c / (q * np.square(perp_side))
-    d_para = 2 * n * c * (2 * q * q - n2) / (q * np.square(para_side))
+    perp = -n2_1 / np.square(c + q)
+    para = n2_1 * ((n * n + 1) * c * c - 1) / np.square(n * n * c + q)
     result: FloatArray = -(perp * d_perp + para * d_para)
     return result
 
@@ -106,16 +129,19 @@ def transmittance_slope(theta: ArrayLike, n: ArrayLike) -> FloatArray:
 def wolff_polynomial(theta: ArrayLike, epsilon: float = 0.07) -> FloatArray:
     """Wolff's polynomial for F: 1998, after (7): ((2 theta/pi)^5 + epsilon) / (1 + epsilon).
 
-    `theta` in radians. It is coarse: with 0.07, against the exact F of n = 1.5, it is 0.025 too
-    high at normal incidence (0.065 for 0.040) and up to 0.20 too high, at 79 degrees.
+    `theta` in radians; `epsilon`, which stands for n, 0 or more. It is coarse: with 0.07, against
+    the exact F of n = 1.5, it is 0.025 too high at normal incidence (0.065 for 0.040) and up to
+    0.20 too high, at 79 degrees.
     """
-    fifth = np.power(np.asarray(theta) * (2 / np.pi), 5)
+    if not 0 <= epsilon < np.inf:
+        raise ValueError(f"epsilon = {epsilon:g}; allowed: 0 or more")
+    fifth = np.power(polar("theta", theta) * (2 / np.pi), 5)
     return np.asarray((fifth + epsilon) / (1 + epsilon), dtype=np.float64)
 
 
 def _cosines(theta: ArrayLike, n: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
     """cos(theta), n and q = n cos(theta_t) = sqrt(n^2 - sin^2 theta)."""
-    c, n = np.cos(np.asarray(theta, dtype=np.float64)), np.asarray(n, dtype=np.float64)
+    c, n = np.cos(polar("theta", theta)), np.asarray(n, dtype=np.float64)
     if not np.all(n >= 1):
         raise ValueError(f"n = {_first(n, n >= 1):g}; allowed: 1 or more")
     return c, n, np.sqrt((n - 1) * (n + 1) + c * c)

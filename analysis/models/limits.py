@@ -1,11 +1,12 @@
-"""Where the models' formulas end: what their `holds` kernels share."""
+"""Where the formulas end: what the models' `holds` kernels share, and the angles of the others."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from analysis.models.base import BoolArray, Validity
-from instrument.geometry import Geometry
+from instrument.geometry import FloatArray, Geometry
 
 GRAZING = "lamp and camera both graze the surface, where the formula grows without limit"
 NEGATIVE = "negative as printed, far forward at high roughness"
@@ -30,3 +31,12 @@ def held(geometry: Geometry, *failures: tuple[BoolArray | bool, str]) -> Validit
             mask &= ~np.asarray(where)
             reasons.append(why)
     return Validity(mask, "; ".join(reasons))
+
+
+def polar(name: str, angle: ArrayLike) -> FloatArray:
+    """The angle from a normal, in radians. Raises `ValueError` for one outside 0 to pi/2."""
+    angle = np.asarray(angle, dtype=np.float64)
+    fine = (angle >= 0) & (angle <= np.pi / 2)
+    if not np.all(fine):
+        raise ValueError(f"{name} = {angle[~fine].flat[0]:.12g} radians; allowed: 0 to pi/2")
+    return angle

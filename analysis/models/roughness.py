@@ -39,25 +39,25 @@ def height_over_length(sigma_deg: float) -> float:
 
 def slope_scale(sigma_h: float, correlation_length: float) -> float:
     """tan(alpha_0) = 2 sigma_h / T, where the lobe of a rough surface is 1/e: 1991, (58)."""
-    _check(sigma_h, correlation_length)
+    check_lengths(sigma_h, correlation_length)
     return 2 * sigma_h / correlation_length
 
 
 def has_lobe(sigma_h: float) -> bool:
     """Whether the lobe counts: sigma_h of 0.025 wavelengths or more."""
-    _check(sigma_h)
+    check_lengths(sigma_h)
     return sigma_h >= SPIKE_ONLY
 
 
 def has_spike(sigma_h: float) -> bool:
     """Whether the spike counts, away from grazing: sigma_h up to 1.5 wavelengths."""
-    _check(sigma_h)
+    check_lengths(sigma_h)
     return sigma_h <= NO_SPIKE
 
 
 def has_spike_like_lobe(sigma_h: float, correlation_length: float) -> bool:
     """Whether the lobe itself looks like a spike: sigma_h / T below 0.02."""
-    _check(sigma_h, correlation_length)
+    check_lengths(sigma_h, correlation_length)
     return sigma_h / correlation_length < SPIKE_LIKE_LOBE
 
 
@@ -66,7 +66,7 @@ def has_gaussian_lobe(sigma_h: float, correlation_length: float) -> bool:
 
     Rougher surfaces have their peak beyond the mirror direction.
     """
-    _check(sigma_h, correlation_length)
+    check_lengths(sigma_h, correlation_length)
     return sigma_h / correlation_length < GAUSSIAN_LOBE
 
 
@@ -77,7 +77,7 @@ def curvature_radius(sigma_h: float, correlation_length: float) -> float:
     autocorrelation exp(-tau^2 / T^2), which is sqrt(12) sigma_h / T^2. Kirchhoff's assumption
     (section III-A-2) needs it to be larger than the wavelength.
     """
-    _check(sigma_h, correlation_length)
+    check_lengths(sigma_h, correlation_length)
     if sigma_h == 0:
         return math.inf
     return correlation_length**2 / (2 * math.sqrt(3) * sigma_h)
@@ -93,7 +93,8 @@ def unshadowed_deg(sigma_h: float, correlation_length: float) -> float:
     return 90 - math.degrees(math.atan(slope_scale(sigma_h, correlation_length)))
 
 
-def _check(sigma_h: float, correlation_length: float = 1.0) -> None:
+def check_lengths(sigma_h: float, correlation_length: float = 1.0) -> None:
+    """Raise `ValueError` for a height below 0 or a length not above it (wavelengths)."""
     if not 0 <= sigma_h < math.inf:
         raise ValueError(f"sigma_h = {sigma_h:g} wavelengths; allowed: 0 or more")
     if not 0 < correlation_length < math.inf:

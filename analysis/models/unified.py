@@ -116,7 +116,8 @@ def moving_source(
 
 def lobe_shape(geometry: Geometry, sigma_deg: float) -> FloatArray:
     """exp(-α²/2σ²), 0 to 1: 1991, (56). α is the half-vector's angle θ_a, not by (39)."""
-    return np.exp(-0.5 * np.square(half_vector(geometry)[0] / math.radians(sigma_deg)))
+    sigma = math.radians(SIGMA_DEG.check(sigma_deg))
+    return np.exp(-0.5 * np.square(half_vector(geometry)[0] / sigma))
 
 
 def spike_shape(geometry: Geometry, spike_width_deg: float) -> FloatArray:
@@ -124,7 +125,7 @@ def spike_shape(geometry: Geometry, spike_width_deg: float) -> FloatArray:
 
     Over the directions it integrates to 1 - w²/3 (w in radians: 1e-4 less at 1 degree).
     """
-    w = math.radians(spike_width_deg)
+    w = math.radians(SPIKE_WIDTH_DEG.check(spike_width_deg))
     return np.exp(-0.5 * np.square(mirror_angle(geometry) / w)) / (2 * math.pi * w**2)
 
 

@@ -6,8 +6,9 @@ of one slope in all azimuths, quick and exact (`analysis.models.oren_nayar_exact
 slopes).
 
 Angles are in radians; theta_i, phi_i point to the lamp, theta_r, phi_r to the camera, theta_a,
-phi_a along the facet's normal; phi = 0 is one azimuth for all. Every argument broadcasts. A
-radiance is given as its two parts, `(direct, twice)`, over E0 cos(theta_i):
+phi_a along the facet's normal; phi = 0 is one azimuth for all. Every argument broadcasts; a theta
+outside 0 to pi/2 is a `ValueError`. A radiance is given as its two parts, `(direct, twice)`, over
+E0 cos(theta_i):
 
     L / (E0 cos theta_i) = (albedo / pi) direct + (albedo^2 / pi) twice      in 1/sr.
 
@@ -24,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.models.limits import polar
 from instrument.geometry import FloatArray
 
 IntArray = NDArray[np.intp]
@@ -51,8 +53,7 @@ def attenuation(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> 
     Max[0, Min[1, 2<s,n><a,n>/<s,a>, 2<v,n><a,n>/<v,a>]]: the three cases of Table 1, and 0 where
     the facet turns away from the lamp or the camera. The order of Max and Min is footnote 6's.
     """
-    sa = _cosine(towards.theta_i, towards.phi_i, theta_a, phi_a)
-    va = _cosine(towards.theta_r, towards.phi_r, theta_a, phi_a)
+    sa, va = _to_lamp(towards, theta_a, phi_a), _to_camera(towards, theta_a, phi_a)
     lit = _over(2 * np.cos(towards.theta_i) * np.cos(theta_a), sa)
     seen = _over(2 * np.cos(towards.theta_r) * np.cos(theta_a), va)
     return np.clip(np.minimum(lit, seen), 0.0, 1.0)
@@ -64,7 +65,7 @@ def critical_angle(theta: FloatArray, theta_a: FloatArray) -> FloatArray:
     Table 2: facets within phi_c of the lamp's azimuth are partly shadowed, those within phi_c of
     the opposite one turn away from it; likewise masking and the camera. 0 where no facet is.
     """
-    return _critical(np.tan(theta) * np.tan(theta_a))
+    return _critical(np.tan(polar("theta", theta)) * np.tan(polar("theta_a", theta_a)))
 
 
 def masked_width(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> FloatArray:
@@ -72,8 +73,7 @@ def masked_width(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) ->
 
     Erratum: printed as "visible"; the integral (23) starts at it. 1 where the facet turns away.
     """
-    va = _cosine(towards.theta_r, towards.phi_r, theta_a, phi_a)
-    va_other = _cosine(towards.theta_r, towards.phi_r, theta_a, phi_a + np.pi)
+    va, va_other = (_to_camera(towards, theta_a, phi) for phi in (phi_a, phi_a + np.pi))
     return np.where(va > 0, np.clip(-_over(va_other, va), 0.0, 1.0), 1.0)
 
 
@@ -82,8 +82,7 @@ def shadowed_width(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) 
 
     Erratum: printed as "illuminated". 1 where that facet turns away from the lamp.
     """
-    sa = _cosine(towards.theta_i, towards.phi_i, theta_a, phi_a)
-    sa_other = _cosine(towards.theta_i, towards.phi_i, theta_a, phi_a + np.pi)
+    sa, sa_other = (_to_lamp(towards, theta_a, phi) for phi in (phi_a, phi_a + np.pi))
     return np.where(sa_other > 0, np.clip(-_over(sa, sa_other), 0.0, 1.0), 1.0)
 
 
@@ -98,14 +97,14 @@ def interreflection_factor(
     def d(x: FloatArray | float, y: FloatArray | float) -> FloatArray:
         return np.sqrt(np.maximum(0.0, x * x + 2 * x * y * np.cos(2 * theta_a) + y * y))
 
-    return np.pi / 2 * (d(1.0, masked) + d(1.0, shadowed) - d(shadowed, masked) - d(1.0, 1.0))
+    exchanged = d(1.0, masked) + d(1.0, shadowed) - d(shadowed, masked) - d(1.0, 1.0)
+    return np.pi / 2 * np.maximum(exchanged, 0.0)  # rounding may leave it just below
 
 
 def projected_radiance(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> Radiance:
     """Projected radiance of one facet: (10) times (16), Table 1; and (26). Sum: (27)."""
-    sa = _cosine(towards.theta_i, towards.phi_i, theta_a, phi_a)
-    sa_other = _cosine(towards.theta_i, towards.phi_i, theta_a, phi_a + np.pi)
-    va = _cosine(towards.theta_r, towards.phi_r, theta_a, phi_a)
+    sa, sa_other = (_to_lamp(towards, theta_a, phi) for phi in (phi_a, phi_a + np.pi))
+    va = _to_camera(towards, theta_a, phi_a)
     scale = np.cos(theta_a) * np.cos(towards.theta_i) * np.cos(towards.theta_r)
     direct = sa * va * attenuation(towards, theta_a, phi_a) / scale
     factor = interreflection_factor(
@@ -137,12 +136,13 @@ def isotropic_single_slope(
     every kink: the critical angles of shadowing and masking (39), and where the two widths are
     equal. In between, the direct part is a trigonometric polynomial and is integrated in closed
     form; so is the part of two bounces where nothing is hidden. Elsewhere that takes Gauss-Legendre
-    of `nodes` nodes (4 or more; 10 give 1e-6, 24 give 1e-8), 2 nodes - 4 where lamp and camera are
+    of `nodes` nodes (4 or more; 10 give 1e-6, 28 give 1e-8), 2 nodes - 4 where lamp and camera are
     both partly hidden, fewer on narrow pieces. No mixing of azimuths (44).
     """
     if nodes < 4:
         raise ValueError(f"nodes = {nodes}; allowed: 4 or more")
-    arrays = np.broadcast_arrays(theta_i, theta_r, dphi, theta_a)
+    theta_i, theta_r = polar("theta_i", theta_i), polar("theta_r", theta_r)
+    arrays = np.broadcast_arrays(theta_i, theta_r, dphi, polar("theta_a", theta_a))
     shape = arrays[0].shape
     cavities = _Cavities.of(*(np.asarray(x, dtype=np.float64).ravel() for x in arrays))
     panels = _Panels.of(cavities)
@@ -154,10 +154,22 @@ def isotropic_single_slope(
     return Radiance(direct.reshape(shape), twice.reshape(shape))
 
 
+def _to_lamp(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> FloatArray:
+    """<s, a>."""
+    theta_i, theta_a = polar("theta_i", towards.theta_i), polar("theta_a", theta_a)
+    return _cosine(theta_i, towards.phi_i, theta_a, phi_a)
+
+
+def _to_camera(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> FloatArray:
+    """<v, a>."""
+    theta_r, theta_a = polar("theta_r", towards.theta_r), polar("theta_a", theta_a)
+    return _cosine(theta_r, towards.phi_r, theta_a, phi_a)
+
+
 def _cosine(
     theta: FloatArray, phi: FloatArray, theta_a: FloatArray, phi_a: FloatArray
 ) -> FloatArray:
-    """<s, a> of two directions."""
+    """Cosine of the angle between two directions."""
     return np.asarray(
         np.cos(theta) * np.cos(theta_a) + np.sin(theta) * np.sin(theta_a) * np.cos(phi - phi_a)
     )
