@@ -63,16 +63,16 @@ def cost_of(
 def measurements(reduced: Reduced, loaded: Loaded, without: Sequence[str] = ()) -> Measurements:
     """The sound points as the fit sees them, `without` some parts of their uncertainty.
 
-    Without a white tile they are relative: radiance over cos(theta_i), which goes as the BRDF as
-    long as the lamp gives the same irradiance at every setting, but for its cosine.
+    Without a white tile they are relative: radiance over cos(theta_i), which goes as the BRDF at
+    one setting of the lamp; how bright the lamp is at each setting is not known.
     """
     keep = reduced.sound
     points = [p for p, kept in zip(reduced.points, keep, strict=True) if kept]
     own = [u[keep] for name, u in reduced.components.items() if name not in without]
-    shared = (*reduced.shared, *reduced.shared_by_tile)
     theta_i_deg, axes = np.array([p.theta_i_deg for p in points]), loaded.rig.axes
-    value = reduced.brdf if reduced.has_brdf else reduced.radiance
-    brdf = value[keep] if reduced.has_brdf else value[keep] / np.cos(np.radians(theta_i_deg))
+    shared = (*reduced.shared, *reduced.shared_by_tile)
+    brdf = reduced.brdf if reduced.has_brdf else reduced.radiance
+    brdf = brdf[keep] if reduced.has_brdf else brdf[keep] / np.cos(np.radians(theta_i_deg))
     return Measurements(
         theta_i_deg,
         np.array([p.theta_r_deg for p in points]),
@@ -85,4 +85,5 @@ def measurements(reduced: Reduced, loaded: Loaded, without: Sequence[str] = ()) 
         u_theta_r_deg=axes.theta_r.u_deg,
         u_dphi_deg=axes.dphi.u_deg,
         relative=not reduced.has_brdf,
+        free_levels=not reduced.has_brdf,
     )

@@ -7,7 +7,7 @@ incidences or blocks of view angle that were left out of its fit.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +29,7 @@ from analysis.measurements import Measurements
 from analysis.models import MODELS
 from analysis.models.departure import departure
 from analysis.relative import NAME as RELATIVE_FACTOR
+from analysis.relative import levelled
 from analysis.structure import failures, runs_probability
 from analysis.symmetry import Symmetry, p_text, symmetry
 from instrument.errors import NotDetermined
@@ -85,12 +86,20 @@ def choose(
         names = ", ".join(model.name for model in named)
         raise NotDetermined(f"{measurements.size} points are too few to fit any of: {names}")
     first = _first_fits(possible, measurements, robust, every=models is not None)
-    best = min(first.values(), key=lambda f: (not f.solution.converged, f.bic))
+    best = _best(first)
+    if measurements.free_levels:
+        measurements = levelled(measurements, best.brdf)
+        first = _first_fits(possible, measurements, robust, every=models is not None)
+        best = _best(first)
     candidates = tuple(
         refined(f, measurements, None if _hopeless(f, best) else acceptance, best.brdf)
         for f in first.values()
     )
     return _chosen(candidates, measurements, [m.name for m in named if m.name not in possible])
+
+
+def _best(first: Mapping[str, FirstFit]) -> FirstFit:
+    return min(first.values(), key=lambda f: (not f.solution.converged, f.bic))
 
 
 def _first_fits(

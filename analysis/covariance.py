@@ -18,6 +18,9 @@ from instrument.geometry import FloatArray, Geometry
 
 Brdf = Callable[[Geometry], FloatArray]
 
+LAMP_LEVEL = "lamp level"
+_ANY_LEVEL = 1.0  # relative u of a level that is not known at all
+
 
 @dataclass(frozen=True, slots=True)
 class Covariance:
@@ -121,6 +124,8 @@ def shared(
         ("dphi, lamp setting", _change(m, own, **azimuth), m.lamp_setting),
         *((error.name, f * error.u_relative, error.group) for error in m.shared),
     ]
+    if m.free_levels:
+        groups.append((LAMP_LEVEL, _ANY_LEVEL * f, m.lamp_setting))
     bends = [_bend(m, smooth, **angle) for angle in (view, incidence, azimuth)]
     variance = np.square(m.u_random) + np.sum(np.square(bends), axis=0)
     columns, names = [], []

@@ -22,7 +22,7 @@ from analysis.models import MODELS, Model
 from analysis.models.base import BoolArray
 from analysis.problem import Problem
 from analysis.relative import NAME as RELATIVE_FACTOR
-from analysis.relative import relative
+from analysis.relative import levelled, relative, untied
 from analysis.starts import starts
 from analysis.uncertainty import uncertainty
 from instrument.errors import NotDetermined
@@ -112,6 +112,9 @@ def fit(
     (without a stated u: no more points than parameters).
     """
     first = first_fit(model, measurements, robust)
+    if measurements.free_levels:
+        measurements = levelled(measurements, first.brdf)
+        first = first_fit(model, measurements, robust)
     return refined(first, measurements, acceptance, smooth or first.brdf)
 
 
@@ -296,7 +299,7 @@ def _result(m: Measurements, whole: Averaged, covariance: Covariance) -> FitResu
     problem, found = replace(whole.problem, covariance=covariance), whole.solution
     x = found.x
     noise = _noise(m, whole.problem, found)
-    known = uncertainty(whole.problem, found, noise)
+    known = uncertainty(whole.problem, found, noise, untied(problem.model) if m.relative else ())
     predicted = problem.predict(x)
     residual = m.brdf - predicted
     scale = math.sqrt(noise) if m.u_random is None and problem.huber is None else 1.0

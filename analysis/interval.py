@@ -14,7 +14,6 @@ from scipy.optimize import brentq
 
 from analysis.descent import Minimum
 from analysis.problem import Problem
-from instrument.geometry import FloatArray
 
 RISE_95 = 3.84
 
@@ -30,30 +29,39 @@ def interval(
 
     An end on a bound of the domain means that the data do not limit the parameter on that side.
     """
-    profile = _Profile(problem, best, index, rise, {float(best.x[index]): best.x})
+    profile = _Profile(problem, best, index, rise, {float(best.x[index]): best})
     return profile.end(float(problem.low[index])), profile.end(float(problem.high[index]))
 
 
 @dataclass(frozen=True, slots=True)
 class _Profile:
-    """chi2 over one parameter, the others fitted anew; `solved` has their values so far."""
+    """chi2 over one parameter, the others fitted anew; `solved` has what was found so far."""
 
     problem: Problem
     best: Minimum
     index: int
     rise: float
-    solved: dict[float, FloatArray]
+    solved: dict[float, Minimum]
 
     def excess(self, value: float) -> float:
         """How far chi2 is above what is allowed, as a root: about linear in the distance."""
-        nearest = min(self.solved, key=lambda known: abs(known - value))
-        x = self.solved[nearest].copy()
-        x[self.index] = value
-        chi2 = self.problem.chi2(x)
-        if chi2 - self.best.chi2 > self.rise:  # else there is no need: it only lowers chi2
-            found = self.problem.solve(x, [self.index], enough=_SETTLED * self.rise)
-            self.solved[value], chi2 = found.x, found.chi2
-        return math.sqrt(max(chi2 - self.best.chi2, 0.0)) - math.sqrt(self.rise)
+        if value not in self.solved:
+            self.solved[value] = self._solve(value)
+        above = max(self.solved[value].chi2 - self.best.chi2, 0.0)
+        return math.sqrt(above) - math.sqrt(self.rise)
+
+    def _solve(self, value: float) -> Minimum:
+        """The others fitted from where they were at the nearest value, or from the best fit."""
+        nearest = self.solved[min(self.solved, key=lambda known: abs(known - value))]
+        for start in (nearest, self.best):
+            x = start.x.copy()
+            x[self.index] = value
+            at = Minimum(x, self.problem.chi2(x), True, "")
+            if at.chi2 - self.best.chi2 > self.rise:  # else no need: a fit only lowers chi2
+                at = self.problem.solve(x, [self.index], enough=_SETTLED * self.rise)
+            if at.chi2 - self.best.chi2 <= self.rise:
+                break
+        return at
 
     def end(self, bound: float) -> float:
         """The end towards a bound of the domain."""

@@ -55,6 +55,7 @@ class Measurements:
     u_theta_i_deg, u_theta_r_deg, u_dphi_deg: of the angles, in degrees; points of the same
         theta_r share its error.
     relative: `brdf` and `u_random` are a radiance in a unit of its own, tied to no reference.
+    free_levels: how bright the lamp is at each of its settings is not known.
 
     Raises `ValueError` for shapes that differ, values that are not finite, angles outside their
     domain, a `u_random` that is not positive, or a negative uncertainty of an angle.
@@ -71,6 +72,7 @@ class Measurements:
     u_theta_r_deg: float = 0.0
     u_dphi_deg: float = 0.0
     relative: bool = False
+    free_levels: bool = False
 
     def __post_init__(self) -> None:
         self._check_arrays()

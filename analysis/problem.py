@@ -76,19 +76,24 @@ class Problem:
         if not free:
             return Minimum(start, self.chi2(start), True, "nothing to vary")
 
+        by_log = np.array([self.model.parameters[i].logarithmic for i in free])
+
+        def searched(x: FloatArray) -> FloatArray:
+            return np.where(by_log, np.log(np.where(by_log, x[free], 1.0)), x[free])
+
         def full(y: FloatArray) -> FloatArray:
             x = start.copy()
-            x[free] = y
+            x[free] = np.clip(np.where(by_log, np.exp(np.where(by_log, y, 0.0)), y), low, high)
             return x
 
+        def jacobian(y: FloatArray) -> FloatArray:
+            x = full(y)
+            return self.jacobian(x, free) * np.where(by_log, x[free], 1.0)
+
+        low, high = self.low[free], self.high[free]
+        ends = searched(self.low), searched(self.high)
         found = descend(
-            lambda y: self.residual(full(y)),
-            lambda y: self.jacobian(full(y), free),
-            start[free],
-            self.low[free],
-            self.high[free],
-            self.huber,
-            enough,
+            lambda y: self.residual(full(y)), jacobian, searched(start), *ends, self.huber, enough
         )
         return found._replace(x=full(found.x))
 

@@ -7,7 +7,7 @@ the profile-likelihood interval is given instead.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,10 +39,14 @@ class Uncertainty:
     correlation: FloatArray
 
 
-def uncertainty(problem: Problem, best: Minimum, variance: float) -> Uncertainty:
+def uncertainty(
+    problem: Problem, best: Minimum, variance: float, untied: Collection[str] = ()
+) -> Uncertainty:
     """Uncertainties of the parameters at a minimum, in their own units.
 
     `variance` is that of the whitened residuals: 1 where the data's u is stated, else estimated.
+    `untied`: parameters that no reference ties down: not determined, whatever else may hint at
+    them.
     """
     C, loose = _linear(problem, best.x, variance)
     u: dict[str, float | None] = {}
@@ -51,14 +55,15 @@ def uncertainty(problem: Problem, best: Minimum, variance: float) -> Uncertainty
     for i, parameter in enumerate(problem.model.parameters):
         linear = None if loose[i] else float(np.sqrt(C[i, i]))
         u[parameter.name] = linear
-        if linear is not None and _inside(problem, best.x, i, 2 * linear):
+        tied = parameter.name not in untied
+        if tied and linear is not None and _inside(problem, best.x, i, 2 * linear):
             continue
         ends = interval(problem, best, i, RISE_95 * variance)
-        if linear is not None and _parabola(problem, float(best.x[i]), i, linear, ends):
+        if tied and linear is not None and _parabola(problem, float(best.x[i]), i, linear, ends):
             continue
         u[parameter.name] = None
         intervals[parameter.name] = ends
-        if ends[1] - ends[0] > (parameter.high - parameter.low) / 2:
+        if not tied or ends[1] - ends[0] > (parameter.high - parameter.low) / 2:
             undetermined.append(parameter.name)
     return Uncertainty(u, intervals, tuple(undetermined), _correlation(C, list(u.values())))
 

@@ -39,6 +39,7 @@ class Parameter:
     rises about in proportion to it from zero: a fit then solves for its first value instead of
     searching. `starts`: values from which a fit tries the search; none given: seven over the
     domain, denser towards its low end, as narrow lobes are easier to miss than wide ones.
+    `logarithmic`: a fit searches for its logarithm; the domain then begins above 0.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Parameter:
     default: float
     scale: bool = False
     starts: tuple[float, ...] = ()
+    logarithmic: bool = False
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
@@ -60,11 +62,13 @@ class Parameter:
             parts = ((k + 0.5) / 7 for k in range(7))
             starts = tuple(self.low + part * part * (self.high - self.low) for part in parts)
             object.__setattr__(self, "starts", starts)
-        if self.scale and not self.low == 0 < self.default:
+        if self.scale and not 0 <= self.low < self.default:
             raise ValueError(
-                f"{self.name}: a scale has the lower bound 0 and a default above it; "
+                f"{self.name}: a scale has a lower bound of 0 or more and a default above it; "
                 f"got {self.low:g} and {self.default:g}"
             )
+        if self.logarithmic and self.low <= 0:
+            raise ValueError(f"{self.name}: logarithmic, so its domain begins above {self.low:g}")
 
     def check(self, value: float) -> float:
         """Return the value as a float, or raise `ValueError` when it is not in the domain."""
