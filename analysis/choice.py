@@ -7,24 +7,17 @@ incidences or blocks of view angle that were left out of its fit.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from analysis.acceptance import Acceptance
-from analysis.fit import (
-    LEAST_NOISE,
-    UNLIKELY,
-    FirstFit,
-    FitResult,
-    determined,
-    first_fit,
-    probability,
-    refined,
-)
+from analysis.first_fit import FirstFit, deepened, determined, quick_fit
+from analysis.fit import FitResult, refined
 from analysis.held_out import folds, held_out
 from analysis.ladder import LADDER, approximation, physics
+from analysis.likelihood import LEAST_NOISE, UNLIKELY, probability
 from analysis.measurements import Measurements
 from analysis.models import MODELS
 from analysis.models.departure import departure
@@ -86,32 +79,38 @@ def choose(
         names = ", ".join(model.name for model in named)
         raise NotDetermined(f"{measurements.size} points are too few to fit any of: {names}")
     first = _first_fits(possible, measurements, robust, every=models is not None)
-    best = _best(first)
     if measurements.free_levels:
-        measurements = levelled(measurements, best.brdf)
+        measurements = levelled(measurements, _best(first).brdf)
         first = _first_fits(possible, measurements, robust, every=models is not None)
-        best = _best(first)
+    best = _best(first)
     candidates = tuple(
-        refined(f, measurements, None if _hopeless(f, best) else acceptance, best.brdf)
-        for f in first.values()
+        refined(f, measurements, acceptance, best.brdf, _hopeless(f, best, measurements))
+        for f in first
     )
     return _chosen(candidates, measurements, [m.name for m in named if m.name not in possible])
 
 
-def _best(first: Mapping[str, FirstFit]) -> FirstFit:
-    return min(first.values(), key=lambda f: (not f.solution.converged, f.bic))
+def _best(first: Iterable[FirstFit]) -> FirstFit:
+    return min(first, key=lambda f: (not f.solution.converged, f.bic))
 
 
 def _first_fits(
     names: Sequence[str], measurements: Measurements, robust: bool, every: bool
-) -> dict[str, FirstFit]:
-    """First fits by name, in that order; an integrated model where it may differ, or `every`."""
-    fits: dict[str, FirstFit] = {}
+) -> list[FirstFit]:
+    """First fits in the order of the names; an integrated model where it may differ, or `every`.
+
+    Further basins of a model are looked into unless it is hopeless in the first one.
+    """
+    quick: dict[str, FirstFit] = {}
     for name in names:
-        form = fits.get(approximation(name) or "")
+        form = quick.get(approximation(name) or "")
         if every or form is None or _leaves_integral(form, measurements):
-            fits[name] = first_fit(MODELS[name], measurements, robust)
-    return fits
+            quick[name] = quick_fit(MODELS[name], measurements)
+    best = _best(quick.values())
+    return [
+        f if _hopeless(f, best, measurements) else deepened(f, measurements, robust)
+        for f in quick.values()
+    ]
 
 
 def _leaves_integral(form: FirstFit, measurements: Measurements) -> bool:
@@ -129,8 +128,10 @@ def _leaves_integral(form: FirstFit, measurements: Measurements) -> bool:
     return bool(np.any(off > SAME_PREDICTION * u))
 
 
-def _hopeless(fit: FirstFit, best: FirstFit) -> bool:
-    return fit.solution.chi2 > _HOPELESS * max(best.solution.chi2, float(fit.problem.brdf.size))
+def _hopeless(fit: FirstFit, best: FirstFit, m: Measurements) -> bool:
+    """Whether neither averaging over the rig nor another basin can bring a model near the best."""
+    enough = 0.0 if m.u_random is None else float(m.size)
+    return fit.solution.chi2 > _HOPELESS * max(best.solution.chi2, enough)
 
 
 def _chosen(

@@ -11,37 +11,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc
 
 from analysis.acceptance import Acceptance, Brdf
 from analysis.averaging import Averaged, average
-from analysis.covariance import Covariance, independent, shared
-from analysis.descent import HUBER, Minimum, weights
+from analysis.covariance import Covariance, shared
+from analysis.first_fit import FirstFit, first_fit
+from analysis.likelihood import UNLIKELY, aicc, bic, noise_variance, probability
 from analysis.measurements import Measurements
 from analysis.models import MODELS, Model
 from analysis.models.base import BoolArray
 from analysis.problem import Problem
-from analysis.relative import NAME as RELATIVE_FACTOR
 from analysis.relative import levelled, relative, untied
-from analysis.starts import starts
 from analysis.uncertainty import uncertainty
-from instrument.errors import NotDetermined
 from instrument.geometry import FloatArray, Geometry
 
-# No camera tells more: smaller residuals, relative to the mean BRDF, are rounding of the search.
-LEAST_NOISE = 1e-5
-# A model whose chi2 is less probable than this does not explain the data.
-UNLIKELY = 1e-3
 UNSETTLED = "the averaging over lamp and lens did not settle"
 
-# Starts that are tried where the first one's minimum does not explain the data.
-_MOST_STARTS = 3
-# Rounds in which a robust fit and its estimate of the noise settle.
-_ROBUST_ROUNDS = 3
 # A robust fit sets residuals beyond this many u aside: of 10 000 good ones, one is.
 _OUTLIER = 4.0
-# Of normal errors, standard deviation over median of the absolute value.
-_PER_MEDIAN = 1.4826
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,79 +105,31 @@ def fit(
     return refined(first, measurements, acceptance, smooth or first.brdf)
 
 
-@dataclass(frozen=True, slots=True)
-class FirstFit:
-    """A model fitted with the independent uncertainties alone, without averaging."""
-
-    problem: Problem
-    solution: Minimum
-    bic: float
-
-    def brdf(self, geometry: Geometry) -> FloatArray:
-        """The fitted model in any geometry, in 1/sr."""
-        return self.problem.plain(self.solution.x, geometry)
-
-
-def first_fit(model: Model, measurements: Measurements, robust: bool = False) -> FirstFit:
-    """The deepest minimum with independent uncertainties. Raises `NotDetermined` as `fit` does.
-
-    Where measurements are relative, the model has one more parameter: see `analysis.relative`.
-    """
-    if measurements.relative:
-        model = relative(model, measurements.brdf)
-    _require_points(model, measurements)
-    problem = Problem(model, measurements.geometry, measurements.brdf, independent(measurements))
-    solution = _deepest(problem, measurements)
-    if robust:
-        problem, solution = _made_robust(problem, solution, measurements)
-    return FirstFit(problem, solution, _bic(measurements, problem, solution))
-
-
-def _deepest(problem: Problem, m: Measurements) -> Minimum:
-    """The minimum from the best start; where it explains too little, of other basins too."""
-    first, *others = starts(problem, _MOST_STARTS)
-    best = problem.solve(first)
-    for start in others:
-        if _explained(problem, best, m):
-            break
-        best = min(best, problem.solve(start), key=lambda found: (not found.converged, found.chi2))
-    return best
-
-
-def _explained(problem: Problem, found: Minimum, m: Measurements) -> bool:
-    if m.u_random is None:
-        return found.converged and found.chi2 <= m.size * _floor(problem)
-    return found.converged and probability(found.chi2, m.size - found.x.size) > UNLIKELY
-
-
-def _made_robust(problem: Problem, solution: Minimum, m: Measurements) -> tuple[Problem, Minimum]:
-    """The fit with Huber's loss; where no u is stated, the residuals' median gives the noise."""
-    problem = replace(problem, huber=HUBER)
-    for _ in range(_ROBUST_ROUNDS if m.u_random is None else 1):
-        if m.u_random is None:
-            left = np.abs(problem.predict(solution.x) - problem.brdf)
-            variance = max((_PER_MEDIAN * float(np.median(left))) ** 2, _floor(problem))
-            problem = replace(
-                problem, covariance=replace(problem.covariance, variance=np.full(m.size, variance))
-            )
-        solution = problem.solve(solution.x)
-    return problem, solution
-
-
 def refined(
-    first: FirstFit, measurements: Measurements, acceptance: Acceptance | None, smooth: Brdf
+    first: FirstFit,
+    measurements: Measurements,
+    acceptance: Acceptance | None,
+    smooth: Brdf,
+    hopeless: bool = False,
 ) -> FitResult:
-    """The fit with all uncertainties shared as they are, and averaged where that matters."""
-    covariance = first.problem.covariance
-    if measurements.u_random is not None:
-        covariance = shared(measurements, smooth, first.brdf)
+    """The fit with all uncertainties shared as they are, and averaged where that matters.
+
+    A `hopeless` one, far off where another model is not, is neither averaged nor profiled: the
+    interval of a parameter that has no u is then its whole domain.
+    """
+    if measurements.u_random is None:
+        covariance = first.problem.covariance
+        whole = _solved(first, measurements, None if hopeless else acceptance, covariance)
+        return _result(measurements, whole, covariance, hopeless)
+    covariance = shared(measurements, smooth, first.brdf)
+    dof = max(measurements.size - first.solution.x.size, 1)
+    wider = replace(covariance, variance=covariance.variance * max(1, first.solution.chi2 / dof))
+    if hopeless:
+        return _result(measurements, _solved(first, measurements, None, wider), covariance, True)
     whole = _solved(first, measurements, acceptance, covariance)
-    dof = measurements.size - first.solution.x.size
-    if measurements.u_random is not None and probability(whole.solution.chi2, dof) < UNLIKELY:
-        misfit = max(1.0, first.solution.chi2 / dof)
-        wider = replace(covariance, variance=covariance.variance * misfit)
+    if probability(whole.solution.chi2, dof) < UNLIKELY:
         whole = _solved(first, measurements, acceptance, wider)
-    return _result(measurements, whole, covariance)
+    return _result(measurements, whole, covariance, False)
 
 
 def stated_u(result: FitResult, measurements: Measurements) -> dict[str, float]:
@@ -225,81 +164,16 @@ def _solved(
     solution = first.solution if same else problem.solve(first.solution.x)
     if acceptance is None:
         return Averaged(problem, solution, False, True)
-    u = covariance.u_independent * math.sqrt(_noise(m, problem, solution))
+    u = covariance.u_independent * math.sqrt(noise_variance(m, problem, solution))
     return average(problem, solution, m, acceptance, u)
 
 
-def probability(chi2: float, dof: int) -> float:
-    """Of a chi2 as large as this or larger, if the model and all stated u are right."""
-    return float(chdtrc(float(dof), chi2)) if dof > 0 else 1.0
-
-
-def determined(model: Model, measurements: Measurements) -> bool:
-    """Whether there are as many points as parameters (one more where no u is stated)."""
-    return measurements.size >= _points_needed(model, measurements)
-
-
-def _points_needed(model: Model, m: Measurements) -> int:
-    named = any(p.name == RELATIVE_FACTOR for p in model.parameters)
-    return len(model.parameters) + (m.u_random is None) + (m.relative and not named)
-
-
-def _require_points(model: Model, measurements: Measurements) -> None:
-    if not determined(model, measurements):
-        raise NotDetermined(
-            f"{model.name} has {len(model.parameters)} parameters; {measurements.size} points do "
-            f"not determine them; allowed: {_points_needed(model, measurements)} points or more"
-            + (" where no u_brdf is stated" if measurements.u_random is None else "")
-        )
-
-
-def _bic(m: Measurements, problem: Problem, found: Minimum) -> float:
-    """Schwarz's criterion: chi2 + K ln N, or N ln(rss / N) + K ln N where no u is stated."""
-    return _deviance(m, problem, found.chi2) + found.x.size * math.log(m.size)
-
-
-def _deviance(m: Measurements, problem: Problem, chi2: float) -> float:
-    """-2 ln of the likelihood but for a constant: chi2, or N ln(rss / N) where no u is stated."""
-    if m.u_random is not None:
-        return chi2
-    rss = chi2 * float(np.mean(problem.covariance.variance))
-    return m.size * math.log(max(rss / m.size, _floor(problem)))
-
-
-def _aicc(m: Measurements, problem: Problem, found: Minimum) -> float:
-    """Akaike's criterion with Hurvich and Tsai's (1989) term for few points."""
-    k = found.x.size + (m.u_random is None)  # the noise is a parameter too where it is estimated
-    spare = m.size - k - 1
-    penalty = 2 * k * m.size / spare if spare > 0 else math.inf
-    return _deviance(m, problem, found.chi2) + penalty
-
-
-def _floor(problem: Problem) -> float:
-    """The least variance of a point, in 1/sr squared, that a fit may find."""
-    return max((LEAST_NOISE * float(np.mean(np.abs(problem.brdf)))) ** 2, 1e-300)
-
-
-def _noise(m: Measurements, problem: Problem, solution: Minimum) -> float:
-    """Variance of the whitened residuals: 1 where u is stated, else estimated from them.
-
-    A robust fit's is Huber's (1981, section 7.6): what counting large residuals less costs.
-    """
-    spare = m.size - solution.x.size
-    if problem.huber is not None and spare > 0:
-        r = problem.residual(solution.x)
-        inside = float(np.mean(np.abs(r) <= problem.huber))
-        psi2 = float(np.sum(np.square(r * weights(r, problem.huber)))) / spare
-        return psi2 / max(inside, 0.5) ** 2
-    if m.u_random is not None:
-        return 1.0
-    return max(solution.chi2 / spare, _floor(problem))
-
-
-def _result(m: Measurements, whole: Averaged, covariance: Covariance) -> FitResult:
+def _result(m: Measurements, whole: Averaged, covariance: Covariance, hopeless: bool) -> FitResult:
     problem, found = replace(whole.problem, covariance=covariance), whole.solution
     x = found.x
-    noise = _noise(m, whole.problem, found)
-    known = uncertainty(whole.problem, found, noise, untied(problem.model) if m.relative else ())
+    noise = noise_variance(m, whole.problem, found)
+    free = untied(problem.model) if m.relative else frozenset[str]()
+    known = uncertainty(whole.problem, found, noise, free, profiles=not hopeless)
     predicted = problem.predict(x)
     residual = m.brdf - predicted
     scale = math.sqrt(noise) if m.u_random is None and problem.huber is None else 1.0
@@ -331,8 +205,8 @@ def _result(m: Measurements, whole: Averaged, covariance: Covariance) -> FitResu
         chi2=chi2 if stated else None,
         dof=dof,
         reduced_chi2=chi2 / dof if stated and dof > 0 else None,
-        bic=_bic(m, problem, found),
-        aicc=_aicc(m, problem, found),
+        bic=bic(m, problem, found),
+        aicc=aicc(m, problem, found),
         rms_relative=rms / mean if mean else math.inf,
         averaged=whole.used,
         converged=found.converged and whole.settled,

@@ -40,13 +40,17 @@ class Uncertainty:
 
 
 def uncertainty(
-    problem: Problem, best: Minimum, variance: float, untied: Collection[str] = ()
+    problem: Problem,
+    best: Minimum,
+    variance: float,
+    untied: Collection[str] = (),
+    profiles: bool = True,
 ) -> Uncertainty:
     """Uncertainties of the parameters at a minimum, in their own units.
 
     `variance` is that of the whitened residuals: 1 where the data's u is stated, else estimated.
     `untied`: parameters that no reference ties down: not determined, whatever else may hint at
-    them.
+    them. Without `profiles` an interval is the whole domain.
     """
     C, loose = _linear(problem, best.x, variance)
     u: dict[str, float | None] = {}
@@ -58,7 +62,9 @@ def uncertainty(
         tied = parameter.name not in untied
         if tied and linear is not None and _inside(problem, best.x, i, 2 * linear):
             continue
-        ends = interval(problem, best, i, RISE_95 * variance)
+        ends = parameter.low, parameter.high
+        if profiles:
+            ends = interval(problem, best, i, RISE_95 * variance)
         if tied and linear is not None and _parabola(problem, float(best.x[i]), i, linear, ends):
             continue
         u[parameter.name] = None
