@@ -13,34 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.acceptance import Acceptance
-from analysis.first_fit import FirstFit, deepened, determined, quick_fit
-from analysis.fit import FitResult, refined
+from analysis.candidates import Candidates
+from analysis.fit import FitResult
 from analysis.held_out import folds, held_out
-from analysis.ladder import LADDER, approximation, physics
+from analysis.ladder import LADDER, RICH, SAME_PREDICTION, physics
 from analysis.likelihood import LEAST_NOISE, UNLIKELY, probability
 from analysis.measurements import Measurements
-from analysis.models import MODELS
-from analysis.models.departure import departure
-from analysis.relative import NAME as RELATIVE_FACTOR
-from analysis.relative import levelled
 from analysis.structure import failures, runs_probability
 from analysis.symmetry import Symmetry, p_text, symmetry
-from instrument.errors import NotDetermined
 from instrument.geometry import FloatArray
 
 # A larger BIC by less than this is no evidence (Kass and Raftery, "Bayes Factors", 1995: "not
 # worth more than a bare mention").
 TIE_BIC = 2.0
-# Predictions that differ less than this part of u are the same for all that they serve.
-SAME_PREDICTION = 1 / 3
 # Such a cheaper method may leave this many times the chi2 that the better one leaves.
 SAME_CHI2 = 2.0
 MOST_RMS_RELATIVE = 0.05
 # Below this reduced chi2 the stated u is not the points' own scatter, but holds errors that they
 # share: what they then leave in a row is inside u.
 _NOT_SCATTER = 0.5
-# A first fit with so many times the best one's chi2 is not made better by averaging over the rig.
-_HOPELESS = 25.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,76 +58,28 @@ def choose(
 ) -> Choice:
     """Fit every model and choose the simplest that explains the data as well as the best does.
 
-    A first pass with independent uncertainties finds the best smooth curve near the data; around
-    it the second pass makes the covariance of all uncertainties for every candidate. Models with
-    too many parameters for the points are left out; without `models`, which are then those of the
-    ladder, so is an integrated one whose functional form is as good. Raises `NotDetermined` when
-    too few points leave none of them, `KeyError` for an unknown model.
+    Without `models` they are those of the ladder, and where these do not explain the data the rich
+    ones too; an integrated model whose functional form is as good is then left out. Models with
+    too many parameters for the points are left out. Raises `NotDetermined` when too few points
+    leave none of them, `KeyError` for an unknown model.
     """
-    named = [MODELS[name] for name in models or LADDER]
-    possible = [model.name for model in named if determined(model, measurements)]
-    if not possible:
-        names = ", ".join(model.name for model in named)
-        raise NotDetermined(f"{measurements.size} points are too few to fit any of: {names}")
-    first = _first_fits(possible, measurements, robust, every=models is not None)
-    if measurements.free_levels:
-        measurements = levelled(measurements, _best(first).brdf)
-        first = _first_fits(possible, measurements, robust, every=models is not None)
-    best = _best(first)
-    candidates = tuple(
-        refined(f, measurements, acceptance, best.brdf, _hopeless(f, best, measurements))
-        for f in first
-    )
-    return _chosen(candidates, measurements, [m.name for m in named if m.name not in possible])
+    candidates = Candidates.of(models or LADDER, measurements, robust, every=models is not None)
+    choice = _chosen(candidates, acceptance)
+    if models is not None or _explained(choice):
+        return choice
+    return _chosen(candidates.with_more(RICH), acceptance)
 
 
-def _best(first: Iterable[FirstFit]) -> FirstFit:
-    return min(first, key=lambda f: (not f.solution.converged, f.bic))
+def _explained(choice: Choice) -> bool:
+    """Whether nothing is left for a larger model: no more than the stated u, or than rounding."""
+    chosen = next((c for c in choice.candidates if c.model == choice.chosen), None)
+    if chosen is None or chosen.chi2 is not None:
+        return chosen is not None and choice.verdict != "none adequate"
+    return chosen.rms_relative <= LEAST_NOISE
 
 
-def _first_fits(
-    names: Sequence[str], measurements: Measurements, robust: bool, every: bool
-) -> list[FirstFit]:
-    """First fits in the order of the names; an integrated model where it may differ, or `every`.
-
-    Further basins of a model are looked into unless it is hopeless in the first one.
-    """
-    quick: dict[str, FirstFit] = {}
-    for name in names:
-        form = quick.get(approximation(name) or "")
-        if every or form is None or _leaves_integral(form, measurements):
-            quick[name] = quick_fit(MODELS[name], measurements)
-    best = _best(quick.values())
-    return [
-        f if _hopeless(f, best, measurements) else deepened(f, measurements, robust)
-        for f in quick.values()
-    ]
-
-
-def _leaves_integral(form: FirstFit, measurements: Measurements) -> bool:
-    """Whether the functional form, as fitted, is off the integral by more than u/3 anywhere."""
-    names = [p.name for p in form.problem.model.parameters]
-    values = dict(zip(names, map(float, form.solution.x), strict=True))
-    geometry, albedo, sigma = measurements.geometry, values["albedo"], values["sigma_deg"]
-    rough = MODELS["oren_nayar"].brdf(geometry, albedo=albedo, sigma_deg=sigma)
-    rough *= values.get(RELATIVE_FACTOR, 1.0)
-    off = np.abs(rough * departure("oren_nayar", geometry, albedo, sigma))
-    u = measurements.u_random
-    if u is None:
-        left = form.problem.predict(form.solution.x) - measurements.brdf
-        u = np.full(measurements.size, float(np.sqrt(np.mean(np.square(left)))))
-    return bool(np.any(off > SAME_PREDICTION * u))
-
-
-def _hopeless(fit: FirstFit, best: FirstFit, m: Measurements) -> bool:
-    """Whether neither averaging over the rig nor another basin can bring a model near the best."""
-    enough = 0.0 if m.u_random is None else float(m.size)
-    return fit.solution.chi2 > _HOPELESS * max(best.solution.chi2, enough)
-
-
-def _chosen(
-    candidates: tuple[FitResult, ...], measurements: Measurements, left_out: list[str]
-) -> Choice:
+def _chosen(tried: Candidates, acceptance: Acceptance | None) -> Choice:
+    candidates, measurements = tried.refined(acceptance), tried.measurements
     converged = [c for c in candidates if c.converged]
     if not converged:
         return Choice(candidates, None, "none adequate", "no fit converged")
@@ -145,8 +88,8 @@ def _chosen(
     verdict, reason = _judged(chosen, measurements)
     if chosen is not best:
         reason += f"; {best.model}, which has the best BIC, does not earn what it costs"
-    if left_out:
-        reason += f"; left out, too few points: {', '.join(left_out)}"
+    if tried.left_out:
+        reason += f"; left out, too few points: {', '.join(tried.left_out)}"
     noise = max(chosen.rms_relative, LEAST_NOISE) * float(np.mean(measurements.brdf))
     tested = symmetry(measurements, chosen.brdf, noise)
     return Choice(candidates, chosen.model, verdict, reason, tested)

@@ -65,6 +65,8 @@ def quick_fit(model: Model, measurements: Measurements) -> FirstFit:
 def deepened(quick: FirstFit, m: Measurements, robust: bool = False) -> FirstFit:
     """The fit where it explains the data; else the deepest of all basins that have a start."""
     problem, best = quick.problem, quick.solution
+    if problem.huber is not None:
+        return quick  # it has been through this
     for start in quick.untried:
         if explained(problem, best, m):
             break

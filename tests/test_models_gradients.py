@@ -27,6 +27,8 @@ CONSERVING = {
     "torrance_sparrow_lobe": {"ks": 1.0, "lobe_sigma_deg": 30.0},
     "eon": {"albedo": 1.0, "roughness": 1.0},
     "ggx": {"f0": 1.0, "alpha": 0.5},
+    "ggx_f90": {"f0": 1.0, "f90": 1.0, "alpha": 0.5},
+    "single_scattering": {"scattering": 1.0, "asymmetry": 0.5},
     "wolff": {"single_scattering_albedo": 1.0, "n": 1.5},
 }
 

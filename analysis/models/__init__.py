@@ -13,9 +13,10 @@ from analysis.models.base import Model, Parameter, add
 from analysis.models.beckmann_spizzichino import BECKMANN_SPIZZICHINO
 from analysis.models.diffuse import LAMBERT, OREN_NAYAR, OREN_NAYAR_QUALITATIVE
 from analysis.models.eon import EON
-from analysis.models.ggx import GGX
+from analysis.models.ggx import GGX, GGX_F90
 from analysis.models.minnaert import MINNAERT
 from analysis.models.oren_nayar_exact import OREN_NAYAR_EXACT
+from analysis.models.single_scattering import SINGLE_SCATTERING
 from analysis.models.specular import TORRANCE_SPARROW, TORRANCE_SPARROW_LOBE
 from analysis.models.unified import UNIFIED
 from analysis.models.wolff import WOLFF, WOLFF_OREN_NAYAR
@@ -36,6 +37,8 @@ _ALL = (
     BECKMANN_SPIZZICHINO,
     UNIFIED,
     GGX,
+    GGX_F90,
+    SINGLE_SCATTERING,
 )
 _SINGLE = {m.name: m for m in _ALL}
 

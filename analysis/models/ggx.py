@@ -1,14 +1,17 @@
 """GGX: mirror facets with Trowbridge and Reitz's distribution, whose tails are long.
 
-What to use when: a glossy lobe with a wide halo, or a comparison with renderers. Torrance and
-Sparrow's (`specular.py`) is the papers' own lobe.
+What to use when: `ggx` for a glossy lobe with a wide halo, or a comparison with renderers;
+`ggx_f90` for measured surfaces whose gloss does not rise to 1 at grazing, or rises higher, as that
+of coated, woven or layered ones does. Torrance and Sparrow's (`specular.py`) is the papers' own
+lobe.
 
 Sources: T. S. Trowbridge, K. P. Reitz, Journal of the Optical Society of America 65 (1975); B.
 Walter, S. R. Marschner, H. Li, K. E. Torrance, "Microfacet Models for Refraction through Rough
 Surfaces", EGSR (2007), equations (20), (33), (34); E. Heitz, "Understanding the Masking-Shadowing
 Function in Microfacet-Based BRDFs", Journal of Computer Graphics Techniques 3 (2014), equation
 (99); C. Schlick, "An Inexpensive BRDF Model for Physically-based Rendering", Computer Graphics
-Forum 13 (1994).
+Forum 13 (1994); S. Lagarde, C. de Rousiers, "Moving Frostbite to Physically Based Rendering",
+SIGGRAPH course notes (2014), for f90.
 """
 
 from __future__ import annotations
@@ -23,6 +26,8 @@ from instrument.geometry import FloatArray, Geometry
 F0 = Parameter("f0", "1", 0.0, 1.0, 0.04, scale=True)
 # A lobe narrower than this is a mirror image of the lamp, which no BRDF describes.
 ALPHA = Parameter("alpha", "1", 0.001, 1.0, 0.3)
+# Above 1 it is no reflectance of facets, but the strength of a forward lobe.
+F90 = Parameter("f90", "1", 0.0, 10.0, 1.0, scale=True)
 
 
 def ggx_brdf(geometry: Geometry, f0: float, alpha: float) -> FloatArray:
@@ -57,6 +62,41 @@ def ggx_slopes(geometry: Geometry, f0: float, alpha: float) -> dict[str, FloatAr
     }
 
 
+def ggx_f90_brdf(geometry: Geometry, f0: float, f90: float, alpha: float) -> FloatArray:
+    """As `ggx_brdf`, in 1/sr, with F = f0 + (f90 - f0)(1 - cos theta')^5.
+
+    f0 and f90 are the lobe's strengths at normal incidence and at grazing. Above 1 more light may
+    leave than comes. Never negative; reciprocal.
+    """
+    _, cos_half, D, visibility = _factors(geometry, alpha)
+    F = f0 + (f90 - f0) * np.power(1 - cos_half, 5)
+    return np.asarray(F * D * visibility)
+
+
+def ggx_f90_slopes(
+    geometry: Geometry, f0: float, f90: float, alpha: float
+) -> dict[str, FloatArray]:
+    """Derivatives of `ggx_f90_brdf` by f0, f90 and alpha."""
+    mirrors = ggx_slopes(geometry, 1.0, alpha)["alpha"]  # of facets that reflect all light
+    _, cos_half, D, visibility = _factors(geometry, alpha)
+    schlick = np.power(1 - cos_half, 5)
+    return {
+        "f0": np.asarray((1 - schlick) * D * visibility),
+        "f90": np.asarray(schlick * D * visibility),
+        "alpha": np.asarray((f0 + (f90 - f0) * schlick) * mirrors),
+    }
+
+
+def ggx_f90_holds(geometry: Geometry, f0: float, f90: float, alpha: float) -> Validity:
+    """Where facets reflect no more than they receive, and not where both directions graze."""
+    del alpha  # the limits are the geometry's and those of the strengths
+    return held(
+        geometry,
+        (both_graze(geometry), GRAZING),
+        (max(f0, f90) > 1, "a strength above 1: facets would reflect more than they receive"),
+    )
+
+
 def ggx_holds(geometry: Geometry, f0: float, alpha: float) -> Validity:
     """Everywhere but where lamp and camera both graze the surface."""
     del f0, alpha  # the limit is the geometry's
@@ -83,3 +123,4 @@ def _q(theta: FloatArray, alpha: float) -> FloatArray:
 
 
 GGX = Model("ggx", (F0, ALPHA), ggx_brdf, ggx_slopes, ggx_holds)
+GGX_F90 = Model("ggx_f90", (F0, F90, ALPHA), ggx_f90_brdf, ggx_f90_slopes, ggx_f90_holds)

@@ -1,0 +1,81 @@
+"""Light scattered once inside the surface, by particles that prefer a direction.
+
+What to use when: beside a diffuse term, for loose or layered matter (fibres, powder, skin, plants)
+that sends light back to the lamp, or on past the mirror direction, over a wide range of angles.
+
+Sources: H. von Seeliger (1887) and E. Lommel (1889), for the half-space, as in S. Chandrasekhar,
+Radiative Transfer (Dover 1960), chapter III; L. G. Henyey, J. L. Greenstein, "Diffuse Radiation in
+the Galaxy", Astrophysical Journal 93 (1941), for the phase function; P. Hanrahan, W. Krueger,
+"Reflection from Layered Surfaces due to Subsurface Scattering", SIGGRAPH (1993), for the two as a
+BRDF.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analysis.models.base import Model, Parameter, Validity
+from analysis.models.limits import GRAZING, both_graze, held
+from instrument.geometry import FloatArray, Geometry
+
+# A single-scattering albedo up to 1; above, light scattered more than once goes the same way.
+SCATTERING = Parameter("scattering", "1", 0.0, 10.0, 0.5, scale=True)
+ASYMMETRY = Parameter(
+    "asymmetry", "1", -0.95, 0.95, 0.0, starts=(-0.85, -0.6, -0.3, 0.0, 0.3, 0.6, 0.85)
+)
+
+
+def single_scattering_brdf(geometry: Geometry, scattering: float, asymmetry: float) -> FloatArray:
+    """Lommel and Seeliger's BRDF in 1/sr: scattering p(gamma) / (4 pi (cos_i + cos_r)).
+
+    p = (1 - g^2) / (1 + g^2 + 2 g cos(gamma))^(3/2) is Henyey and Greenstein's phase function of
+    gamma, the angle between the directions to lamp and camera (the light turns by pi - gamma), and
+    g = `asymmetry`: below 0 back to the lamp, 0 to all sides, above 0 forward. The mean of p over
+    the sphere is 1. Never negative; reciprocal; half of Lambert's for g = 0 at normal incidence and
+    view. It grows without limit only where lamp and camera both graze the surface.
+    """
+    cos_sum, base = _denominators(geometry, asymmetry)
+    phase = (1 - asymmetry**2) / (base * np.sqrt(base))
+    return np.asarray(scattering * phase / (4 * np.pi * cos_sum))
+
+
+def single_scattering_slopes(
+    geometry: Geometry, scattering: float, asymmetry: float
+) -> dict[str, FloatArray]:
+    """Derivatives of `single_scattering_brdf` by scattering and by asymmetry."""
+    g = asymmetry
+    per_scattering = single_scattering_brdf(geometry, 1.0, g)
+    _, base = _denominators(geometry, g)
+    growth = -2 * g / (1 - g * g) - 3 * (g + _cos_gamma(geometry)) / base
+    return {"scattering": per_scattering, "asymmetry": scattering * per_scattering * growth}
+
+
+def single_scattering_holds(geometry: Geometry, scattering: float, asymmetry: float) -> Validity:
+    """Where particles scatter no more than they receive, and not where both directions graze."""
+    del asymmetry  # where it holds does not depend on it
+    return held(
+        geometry,
+        (both_graze(geometry) & (scattering > 0), GRAZING),
+        (scattering > 1, "scattering above 1: particles would send out more than they receive"),
+    )
+
+
+def _denominators(geometry: Geometry, g: float) -> tuple[FloatArray, FloatArray]:
+    """cos_i + cos_r, and 1 + g^2 + 2 g cos(gamma)."""
+    cos_sum = np.cos(geometry.theta_i) + np.cos(geometry.theta_r)
+    return cos_sum, np.asarray(1 + g * g + 2 * g * _cos_gamma(geometry))
+
+
+def _cos_gamma(geometry: Geometry) -> FloatArray:
+    """Cosine of the angle between the directions to the lamp and to the camera."""
+    across = np.sin(geometry.theta_i) * np.sin(geometry.theta_r) * geometry.cos_dphi
+    return np.asarray(np.cos(geometry.theta_i) * np.cos(geometry.theta_r) + across)
+
+
+SINGLE_SCATTERING = Model(
+    "single_scattering",
+    (SCATTERING, ASYMMETRY),
+    single_scattering_brdf,
+    single_scattering_slopes,
+    single_scattering_holds,
+)
