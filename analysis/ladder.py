@@ -22,11 +22,12 @@ LADDER = (
 
 RICH = (
     "wolff+ggx",
+    "minnaert+single_scattering",
     "lambert+ggx+single_scattering",
+    "lambert+torrance_sparrow_lobe+single_scattering",
     "oren_nayar+torrance_sparrow+single_scattering",
     "oren_nayar_exact+torrance_sparrow+single_scattering",
-    "oren_nayar+ggx_f90",
-    "oren_nayar_exact+ggx_f90",
+    "eon+ggx_f90",
     "minnaert+ggx_f90",
 )
 
