@@ -55,6 +55,8 @@ class Covariance:
         """C^(-1/2) x for x of shape (N,) or (N, M): residuals become independent with u = 1."""
         scale = np.sqrt(self.variance)
         y = x / (scale if x.ndim == 1 else scale[:, np.newaxis])
+        if self.common.shape[1] == 0:
+            return np.asarray(y)
         inner = self._basis.T @ y
         shrink = self._shrink if x.ndim == 1 else self._shrink[:, np.newaxis]
         return np.asarray(y - self._basis @ (shrink * inner))

@@ -20,6 +20,8 @@ from instrument.geometry import FloatArray, Geometry
 
 # Starts that are tried where the first one's minimum does not explain the data.
 _MOST_STARTS = 3
+# A quick fit ends with a step that lowers chi2 by this part of it.
+_NEAR = 1e-4
 # Rounds in which a robust fit and its estimate of the noise settle.
 _ROBUST_ROUNDS = 3
 # Of normal errors, standard deviation over median of the absolute value.
@@ -49,7 +51,7 @@ def first_fit(model: Model, measurements: Measurements, robust: bool = False) ->
 
 
 def quick_fit(model: Model, measurements: Measurements) -> FirstFit:
-    """The minimum from the best start alone. Raises `NotDetermined` as `fit` does.
+    """About the minimum from the best start alone. Raises `NotDetermined` as `fit` does.
 
     Where measurements are relative, the model has one more parameter: see `analysis.relative`.
     """
@@ -58,7 +60,7 @@ def quick_fit(model: Model, measurements: Measurements) -> FirstFit:
     _require_points(model, measurements)
     problem = Problem(model, measurements.geometry, measurements.brdf, independent(measurements))
     first, *others = starts(problem, _MOST_STARTS)
-    solution = problem.solve(first)
+    solution = problem.solve(first, settled=_NEAR)
     return FirstFit(problem, solution, bic(measurements, problem, solution), tuple(others))
 
 
@@ -67,6 +69,7 @@ def deepened(quick: FirstFit, m: Measurements, robust: bool = False) -> FirstFit
     problem, best = quick.problem, quick.solution
     if problem.huber is not None:
         return quick  # it has been through this
+    best = problem.solve(best.x)
     for start in quick.untried:
         if explained(problem, best, m):
             break

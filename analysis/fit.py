@@ -125,7 +125,9 @@ def refined(
     dof = max(measurements.size - first.solution.x.size, 1)
     wider = replace(covariance, variance=covariance.variance * max(1, first.solution.chi2 / dof))
     if hopeless:
-        return _result(measurements, _solved(first, measurements, None, wider), covariance, True)
+        problem = replace(first.problem, covariance=wider)
+        known = Averaged(problem, first.solution, False, True)
+        return _result(measurements, known, covariance, True)
     whole = _solved(first, measurements, acceptance, covariance)
     if probability(whole.solution.chi2, dof) < UNLIKELY:
         whole = _solved(first, measurements, acceptance, wider)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.covariance import Covariance
-from analysis.descent import Minimum, descend, loss
+from analysis.descent import SETTLED, Minimum, descend, loss
 from analysis.models import Model
 from instrument.geometry import FloatArray, Geometry
 
@@ -66,10 +66,16 @@ class Problem:
         columns = [self.gain * slopes[parameters[i].name] for i in indices]
         return self.covariance.whiten(np.stack(columns, axis=1))
 
-    def solve(self, start: FloatArray, held: Iterable[int] = (), enough: float = 0.0) -> Minimum:
+    def solve(
+        self,
+        start: FloatArray,
+        held: Iterable[int] = (),
+        enough: float = 0.0,
+        settled: float = SETTLED,
+    ) -> Minimum:
         """The minimum reached from `start`, with the `held` parameters left where they are.
 
-        A step that lowers chi2 by no more than `enough` is the last.
+        A step that lowers chi2 by no more than `enough`, or the part `settled`, is the last.
         """
         held = frozenset(held)
         free = [i for i in range(start.size) if i not in held]
@@ -93,7 +99,13 @@ class Problem:
         low, high = self.low[free], self.high[free]
         ends = searched(self.low), searched(self.high)
         found = descend(
-            lambda y: self.residual(full(y)), jacobian, searched(start), *ends, self.huber, enough
+            lambda y: self.residual(full(y)),
+            jacobian,
+            searched(start),
+            *ends,
+            self.huber,
+            enough,
+            settled,
         )
         return found._replace(x=full(found.x))
 

@@ -34,9 +34,11 @@ FloatArray = NDArray[np.float64]
 _RADIANS = np.pi / 180  # a product with it is np.radians to the last bit, in a fifth of the time
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Geometry:
     """Broadcast angles of one or many reflections, in degrees, with theta_r >= 0.
+
+    Two are equal only if they are the same object, so that others can keep what belongs to one.
 
     Attributes: `theta_i_deg`, `theta_r_deg` in 0-90, `dphi_deg` in 0-360; arrays of one shape.
     """

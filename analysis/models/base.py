@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import reduce, wraps
+from typing import TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +19,33 @@ from numpy.typing import NDArray
 from instrument.geometry import FloatArray, Geometry
 
 Kernel = Callable[..., FloatArray]
+T = TypeVar("T", bound=FloatArray | tuple[FloatArray, ...])
 
 # Geometries in one block: a kernel's dozen arrays of them fit into a core's cache.
 BLOCK = 8192
 BoolArray = NDArray[np.bool_]
+
+
+def kept(function: Callable[[Geometry], T]) -> Callable[[Geometry], T]:
+    """A function of the angles alone, kept as long as its geometry lives: fits ask often.
+
+    The arrays that it returns, one or a tuple of them, cannot be written to. Those of more
+    geometries than two blocks are not kept.
+    """
+    known: WeakKeyDictionary[Geometry, T] = WeakKeyDictionary()
+
+    @wraps(function)
+    def looked_up(geometry: Geometry) -> T:
+        if geometry in known:
+            return known[geometry]
+        value = function(geometry)
+        if math.prod(geometry.shape) <= 2 * BLOCK:
+            for array in value if isinstance(value, tuple) else (value,):
+                array.setflags(write=False)
+            known[geometry] = value
+        return value
+
+    return looked_up
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,6 +56,17 @@ def log_h_slope(mu: ArrayLike, albedo: float) -> FloatArray:
     return _transform(mu, -np.pi / 2 * W * t_cot_t / rest)
 
 
+def log_h_slope_by_mu(mu: ArrayLike, albedo: float) -> FloatArray:
+    """Derivative of ln H(mu) by mu above 0, under the integral of `h_exact`.
+
+    -(1/pi) int_0^{pi/2} ln(1 - rho t cot t) (cos^2 t - mu^2 sin^2 t)/(cos^2 t + mu^2 sin^2 t)^2 dt.
+    """
+    strength = _logarithms(_in_unit("albedo", albedo))
+    mu2 = np.square(np.asarray(mu, dtype=np.float64))[..., np.newaxis]
+    kernel = (_SIN2_E - mu2 * _COS2_E) / np.square(_SIN2_E + mu2 * _COS2_E)
+    return np.asarray(kernel @ strength / -np.pi)
+
+
 def _transform(mu: ArrayLike, strength: FloatArray) -> FloatArray:
     """-(mu/pi) times the sum of strength / (cos^2 t + mu^2 sin^2 t) over the nodes t."""
     mu = _cosine(mu)

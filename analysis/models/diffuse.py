@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity
+from analysis.models.base import Model, Parameter, Validity, kept
 from analysis.models.limits import GRAZING, NEGATIVE, both_graze, held
 from instrument.geometry import FloatArray, Geometry
 
@@ -49,10 +49,7 @@ def oren_nayar_qualitative_brdf(
     sigma2 = math.radians(sigma_deg) ** 2
     A = 1 - 0.5 * sigma2 / (sigma2 + constant)
     B = 0.45 * sigma2 / (sigma2 + 0.09)
-    alpha, beta = _larger_and_smaller(geometry)
-    return (albedo / np.pi) * (
-        A + B * np.maximum(0.0, geometry.cos_dphi) * np.sin(alpha) * np.tan(beta)
-    )
+    return (albedo / np.pi) * (A + B * _backward_lobe(geometry))
 
 
 def oren_nayar_qualitative_slopes(
@@ -60,8 +57,7 @@ def oren_nayar_qualitative_slopes(
 ) -> dict[str, FloatArray]:
     """Derivatives of `oren_nayar_qualitative_brdf` by albedo, and by sigma in 1/degree."""
     sigma = math.radians(sigma_deg)
-    alpha, beta = _larger_and_smaller(geometry)
-    lobe = np.maximum(0.0, geometry.cos_dphi) * np.sin(alpha) * np.tan(beta)
+    lobe = _backward_lobe(geometry)
     dA, dB = -0.5 * _saturation_slope(sigma, constant), 0.45 * _saturation_slope(sigma, 0.09)
     return {
         "albedo": oren_nayar_qualitative_brdf(geometry, 1.0, sigma_deg, constant),
@@ -128,6 +124,7 @@ def oren_nayar_holds(geometry: Geometry, albedo: float, sigma_deg: float) -> Val
     )
 
 
+@kept
 def roughness_terms(geometry: Geometry) -> FloatArray:
     """What (33) multiplies with sigma^2 / (sigma^2 + 0.09): its terms of C2 and C3.
 
@@ -150,6 +147,14 @@ def sigma_terms_slopes(sigma_deg: float) -> tuple[float, float]:
     return -0.5 * _saturation_slope(sigma, 0.33), _saturation_slope(sigma, 0.09)
 
 
+@kept
+def _backward_lobe(geometry: Geometry) -> FloatArray:
+    """max(0, cos(dphi)) sin(alpha) tan(beta) of (36)."""
+    alpha, beta = _larger_and_smaller(geometry)
+    return np.asarray(np.maximum(0.0, geometry.cos_dphi) * np.sin(alpha) * np.tan(beta))
+
+
+@kept
 def _second_bounce(geometry: Geometry) -> FloatArray:
     """1 - cos(dphi) (2 beta/pi)^2 of (34)."""
     _, beta = _larger_and_smaller(geometry)

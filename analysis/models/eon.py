@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity
+from analysis.models.base import Model, Parameter, Validity, kept
 from analysis.models.diffuse import ALBEDO
 from analysis.models.limits import GRAZING, both_graze, held
 from instrument.geometry import FloatArray, Geometry
@@ -77,6 +77,7 @@ def _multiple_albedo(albedo: float, roughness: float) -> tuple[float, float, flo
     return albedo**2 * E / rest, by_albedo, albedo**2 * (1 - albedo) / rest**2
 
 
+@kept
 def _s_over_t(geometry: Geometry) -> FloatArray:
     theta_i, theta_r = geometry.theta_i, geometry.theta_r
     s = geometry.cos_dphi * np.sin(theta_i) * np.sin(theta_r)
@@ -85,6 +86,7 @@ def _s_over_t(geometry: Geometry) -> FloatArray:
     return np.asarray(np.maximum(s / t, -1.0))
 
 
+@kept
 def _shape(geometry: Geometry) -> FloatArray:
     """(1 - E_i)(1 - E_r)/(1 - E) over A r."""
     return np.asarray(_loss(geometry.theta_i) * _loss(geometry.theta_r) / (_C1 - _C2))

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity
+from analysis.models.base import Model, Parameter, Validity, kept
 from analysis.models.limits import GRAZING, both_graze, held
 from analysis.models.specular import off_mirror2
 from instrument.geometry import FloatArray, Geometry
@@ -107,15 +107,21 @@ def _factors(
     geometry: Geometry, alpha: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """cos^2(theta_a), cos(theta'), D in 1/sr, and G2/(4 cos_i cos_r)."""
-    across2 = off_mirror2(geometry)
-    along2 = np.square(np.cos(geometry.theta_i) + np.cos(geometry.theta_r))
-    length2 = across2 + along2
-    cos2_a, sin2_a = along2 / length2, across2 / length2
+    cos2_a, sin2_a, cos_half = _half_vector(geometry)
     D = np.square(alpha / (alpha * alpha * cos2_a + sin2_a)) / np.pi
     c_i, c_r = np.cos(geometry.theta_i), np.cos(geometry.theta_r)
     q_i, q_r = _q(geometry.theta_i, alpha), _q(geometry.theta_r, alpha)
-    cos_half = np.minimum(np.sqrt(length2) / 2, 1.0)
     return cos2_a, cos_half, D, 0.5 / (c_i * q_r + c_r * q_i)
+
+
+@kept
+def _half_vector(geometry: Geometry) -> tuple[FloatArray, ...]:
+    """cos^2(theta_a), sin^2(theta_a) and cos(theta')."""
+    across2 = off_mirror2(geometry)
+    along2 = np.square(np.cos(geometry.theta_i) + np.cos(geometry.theta_r))
+    length2 = across2 + along2
+    cos_half = np.minimum(np.sqrt(length2) / 2, 1.0)
+    return along2 / length2, across2 / length2, cos_half
 
 
 def _q(theta: FloatArray, alpha: float) -> FloatArray:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity
+from analysis.models.base import Model, Parameter, Validity, kept
 from analysis.models.limits import GRAZING, both_graze, held
 from instrument.geometry import FloatArray, Geometry
 
@@ -66,6 +66,7 @@ def _denominators(geometry: Geometry, g: float) -> tuple[FloatArray, FloatArray]
     return cos_sum, np.asarray(1 + g * g + 2 * g * _cos_gamma(geometry))
 
 
+@kept
 def _cos_gamma(geometry: Geometry) -> FloatArray:
     """Cosine of the angle between the directions to the lamp and to the camera."""
     across = np.sin(geometry.theta_i) * np.sin(geometry.theta_r) * geometry.cos_dphi

@@ -20,7 +20,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity
+from analysis.models.base import Model, Parameter, Validity, kept
 from analysis.models.limits import GRAZING, both_graze, held
 from instrument.geometry import FloatArray, Geometry
 
@@ -44,9 +44,9 @@ def torrance_sparrow_brdf(geometry: Geometry, ks: float, sigma_deg: float) -> Fl
     factor that does not change with angle. Never negative; reciprocal. It grows without limit
     only where lamp and camera both graze the surface.
     """
-    theta_a, cos_a, cos_half = half_vector(geometry)
+    theta_a = half_vector(geometry)[0]
     P = slope_density(theta_a, math.radians(sigma_deg))
-    return ks * P / _denominator(geometry, cos_a, cos_half)
+    return ks * P / _denominator(geometry)
 
 
 def torrance_sparrow_slopes(
@@ -57,9 +57,9 @@ def torrance_sparrow_slopes(
     d ln P / d sigma = (theta_a^2 - <theta_a^2>) / sigma^3: the mean square slope <theta_a^2> is
     the normalisation's part.
     """
-    theta_a, cos_a, cos_half = half_vector(geometry)
+    theta_a = half_vector(geometry)[0]
     sigma = math.radians(sigma_deg)
-    unit = slope_density(theta_a, sigma) / _denominator(geometry, cos_a, cos_half)
+    unit = slope_density(theta_a, sigma) / _denominator(geometry)
     by_sigma = (np.square(theta_a) - mean_square_slope(sigma)) / sigma**3
     return {"ks": unit, "sigma_deg": ks * unit * by_sigma * math.radians(1.0)}
 
@@ -95,10 +95,10 @@ def torrance_sparrow_full(
     a_f ρ_α(α) is P / cos_a here. θ' and θ_a are the half-vector's: the paper's (39), by way of
     asin, is ambiguous and unstable.
     """
-    theta_a, cos_a, cos_half = half_vector(geometry)
+    theta_a = half_vector(geometry)[0]
     F = fresnel(local_incidence(geometry)) if callable(fresnel) else fresnel
     P = density(theta_a) if callable(density) else gaussian(density)(theta_a)
-    return np.asarray(F * P / _denominator(geometry, cos_a, cos_half))
+    return np.asarray(F * P / _denominator(geometry))
 
 
 def gaussian(sigma_deg: float) -> OfAngle:
@@ -122,13 +122,16 @@ def local_incidence(geometry: Geometry) -> FloatArray:
     return theta
 
 
-def _denominator(geometry: Geometry, cos_a: FloatArray, cos_half: FloatArray) -> FloatArray:
+@kept
+def _denominator(geometry: Geometry) -> FloatArray:
     """4 cos_i cos_r cos_a / G in one step: a grazing direction then needs no 0/0."""
+    _, cos_a, cos_half = half_vector(geometry)
     cos_i, cos_r = np.cos(geometry.theta_i), np.cos(geometry.theta_r)
     return np.maximum(4 * cos_i * cos_r * cos_a, 2 * cos_half * np.maximum(cos_i, cos_r))
 
 
-def half_vector(geometry: Geometry) -> tuple[FloatArray, FloatArray, FloatArray]:
+@kept
+def half_vector(geometry: Geometry) -> tuple[FloatArray, ...]:
     """theta_a in radians, cos(theta_a) and cos(theta') of the half-vector.
 
     theta_a is the angle from the sample's normal to the vector half-way between lamp and camera,
@@ -140,6 +143,7 @@ def half_vector(geometry: Geometry) -> tuple[FloatArray, FloatArray, FloatArray]
     return np.arctan2(np.sqrt(across2), along), along / length, length / 2
 
 
+@kept
 def off_mirror2(geometry: Geometry) -> FloatArray:
     """Square of the part along the surface of the unit vectors to lamp and camera, summed.
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.models.base import Model, Parameter, Validity
-from analysis.models.chandrasekhar import h_exact, log_h_slope
+from analysis.models.chandrasekhar import h_exact, log_h_slope, log_h_slope_by_mu
 from analysis.models.diffuse import (
     ALBEDO,
     SIGMA_DEG,
@@ -210,9 +210,24 @@ def _h_and_k_slope_series(rho: float, n: float) -> FloatArray:
 
 def _h_and_k_by_n(mu: FloatArray, rho: float, n: float) -> tuple[FloatArray, FloatArray]:
     """Derivatives of ln H(mu) and K(mu) by n along a ray, whose mu changes with n."""
+    few = _few_cosines(mu)
+    if few is not None:
+        dlog_H, dK = _of_few_by_n(few[0], rho, n)
+        return dlog_H[few[1]], dK[few[1]]
     log_H, K, by_n = _evaluate(_h_and_k_by_n_series(rho, n), mu, n)
     d_log_mu = (1 / (mu * mu) - 1) / n
     return log_H * d_log_mu, K * d_log_mu + by_n
+
+
+def _of_few_by_n(mu: FloatArray, rho: float, n: float) -> tuple[FloatArray, FloatArray]:
+    """`_h_and_k_by_n` of a vector of few cosines, straight."""
+    H, dlog_H = h_exact(mu, rho), log_h_slope_by_mu(mu, rho)
+    x, weight = _inside(rho, n)
+    inverse = 1 / (x + mu[:, np.newaxis])
+    K_by_mu = rho / 2 * H * (dlog_H * (inverse @ weight) - np.square(inverse) @ weight)
+    d_mu = (1 / mu - mu) / n
+    by_n = _internal_return_by_n(mu, rho, max(n, 1 + 1e-12))
+    return dlog_H * d_mu, K_by_mu * d_mu + by_n
 
 
 @lru_cache(maxsize=64)
