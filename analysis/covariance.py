@@ -121,9 +121,9 @@ def shared(
         {"dphi": m.u_dphi_deg},
     )
     groups: list[tuple[str, FloatArray, IntArray | FloatArray]] = [
-        ("theta_r", _change(m, smooth, **view), m.theta_r_deg),
-        ("theta_i, lamp setting", _change(m, own, **incidence), m.lamp_setting),
-        ("dphi, lamp setting", _change(m, own, **azimuth), m.lamp_setting),
+        ("theta_r", change(m, smooth, **view), m.theta_r_deg),
+        ("theta_i, lamp setting", change(m, own, **incidence), m.lamp_setting),
+        ("dphi, lamp setting", change(m, own, **azimuth), m.lamp_setting),
         *((error.name, f * error.u_relative, error.group) for error in m.shared),
     ]
     if m.free_levels:
@@ -169,7 +169,7 @@ def _told_apart(names: list[str]) -> tuple[str, ...]:
     return tuple(apart)
 
 
-def _change(m: Measurements, smooth: Brdf, **angle: float) -> FloatArray:
+def change(m: Measurements, smooth: Brdf, **angle: float) -> FloatArray:
     """Half the change of the model from -u to +u of an angle (degrees), (N,): (df/dx) u.
 
     Steps of u itself, so that a kink counts as far as u reaches over it. Beyond 90 degrees there

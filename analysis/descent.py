@@ -93,9 +93,9 @@ def descend(
         if _no_way_down(slope, x, low, high, chi2, _FLAT):
             return Minimum(x, chi2, True, "no slope is left")
         step = _step(slope, x, low, high, damping)
-        if _promised(slope, step) <= _NOT_WORTH * chi2:
-            settled = damping <= _SHORT or _at_rest(slope, x, low, high, chi2)
-            return Minimum(x, chi2, settled, "chi2 has settled" if settled else _NO_STEP)
+        if _promised(slope, step) <= max(_NOT_WORTH * chi2, enough / 10):
+            rests = damping <= _SHORT or _at_rest(slope, x, low, high, chi2)
+            return Minimum(x, chi2, rests, "chi2 has settled" if rests else _NO_STEP)
         new = _moved(x, step, low, high)
         r = residual(new)
         reached = loss(r, huber)

@@ -20,14 +20,20 @@ MOST_FOLDS = 5
 _LEAST_INCIDENCES = 3
 # A fit to fewer points is near enough to its minimum when a step lowers chi2 by this part of it.
 _SETTLED = 1e-5
+_MOST_LEFT_OUT = 0.5  # of the points: a fit to fewer foretells little, whatever the model
 
 
 def folds(m: Measurements) -> list[BoolArray]:
-    """Points to leave out, (N,) each: incidences together, or, of fewer than three, view angles."""
+    """Points to leave out, (N,) each: incidences together, or view angles.
+
+    View angles where there are fewer than three incidences, or most points are of one. None where
+    all points would be left out at once.
+    """
     incidences = np.round(m.theta_i_deg, 3)
-    if np.unique(incidences).size >= _LEAST_INCIDENCES:
-        return _blocks(incidences)
-    return _blocks(signed_view(m))
+    found = _blocks(incidences) if np.unique(incidences).size >= _LEAST_INCIDENCES else []
+    if not found or max(map(np.mean, found)) > _MOST_LEFT_OUT:
+        found = _blocks(signed_view(m))
+    return found if len(found) > 1 else []
 
 
 def _blocks(values: FloatArray) -> list[BoolArray]:

@@ -13,6 +13,10 @@ from analysis.descent import SETTLED, Minimum, descend, loss
 from analysis.models import Model
 from instrument.geometry import FloatArray, Geometry
 
+# How far off a bound that no slope leads away from a search goes on, as a part of the domain; what
+# it must lower chi2 by to count.
+_OFF_BOUND, _SAME = 1e-3, 1e-9
+
 
 @dataclass(frozen=True, slots=True)
 class Problem:
@@ -76,12 +80,35 @@ class Problem:
         """The minimum reached from `start`, with the `held` parameters left where they are.
 
         A step that lowers chi2 by no more than `enough`, or the part `settled`, is the last.
+        At zero roughness a surface changes with the square of it: no slope leads away from that
+        bound, also where the way on is down. From such a bound the search goes on a little off it.
         """
         held = frozenset(held)
         free = [i for i in range(start.size) if i not in held]
         if not free:
             return Minimum(start, self.chi2(start), True, "nothing to vary")
+        found = self._descended(start, free, enough, settled)
+        off = self.off_level_bounds(found.x, free)
+        if np.array_equal(off, found.x):
+            return found
+        other = self._descended(off, free, enough, settled)
+        return other if other.chi2 < found.chi2 * (1 - _SAME) else found
 
+    def off_level_bounds(self, x: FloatArray, free: Sequence[int]) -> FloatArray:
+        """x, but inside with free parameters that lie on a bound where nothing changes by them."""
+        ends = zip(self.model.parameters, x, strict=True)  # a scale's slope is level nowhere
+        on = [i for i, (p, value) in enumerate(ends) if not p.scale and value in (p.low, p.high)]
+        on = [i for i in on if i in free]
+        if not on:
+            return x
+        level = [i for i, slope in zip(on, self.jacobian(x, on).T, strict=True) if not slope.any()]
+        inside, step = x.copy(), _OFF_BOUND * (self.high - self.low)
+        inside[level] = np.clip(x, self.low + step, self.high - step)[level]
+        return inside
+
+    def _descended(
+        self, start: FloatArray, free: list[int], enough: float, settled: float
+    ) -> Minimum:
         by_log = np.array([self.model.parameters[i].logarithmic for i in free])
 
         def searched(x: FloatArray) -> FloatArray:

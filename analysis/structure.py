@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from analysis.measurements import IntArray, Measurements
-from analysis.sweeps import Sweep, signed_view, sweeps
+from analysis.sweeps import Sweep, in_plane, sweeps
 from instrument.geometry import FloatArray
 
 # A stretch counts as a failure from this many standard deviations of its mean.
@@ -65,15 +65,15 @@ class Stretch(NamedTuple):
 
 
 def failures(m: Measurements, residuals: FloatArray, most: int = 3) -> list[Stretch]:
-    """Where a model fails worst, the worst first; `residuals` (N,) in units of u.
+    """Where a model fails worst, the worst first; `residuals` (N,) in units of u, 0: set aside.
 
     The weight of a stretch is its mean residual over what noise would leave of it.
     """
-    views = signed_view(m)
+    plane, views = in_plane(m)
     swept = sweeps(m)
     inside = np.concatenate([s.points for s in swept]) if swept else np.zeros(0, dtype=np.int64)
     alone = np.setdiff1d(np.arange(m.size), inside)
-    single = [Sweep(float(m.theta_i_deg[k]), float(m.dphi_deg[k]), np.array([k])) for k in alone]
+    single = [Sweep(float(m.theta_i_deg[k]), float(plane[k]), np.array([k])) for k in alone]
     found = [
         _stretch(sweep, part, views, residuals)
         for sweep in (*swept, *single)
@@ -84,6 +84,9 @@ def failures(m: Measurements, residuals: FloatArray, most: int = 3) -> list[Stre
 
 
 def _one_sided(points: IntArray, residuals: FloatArray) -> list[IntArray]:
+    points = points[residuals[points] != 0]
+    if points.size == 0:
+        return []
     sign = residuals[points] > 0
     return np.split(points, np.flatnonzero(sign[1:] != sign[:-1]) + 1)
 

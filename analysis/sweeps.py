@@ -22,22 +22,21 @@ class Sweep(NamedTuple):
 
 def sweeps(m: Measurements) -> list[Sweep]:
     """All sweeps of two points and more, by incidence and plane."""
-    plane, _ = in_plane(m)
-    settings = np.round(np.stack([m.theta_i_deg, plane], axis=1), _DECIMALS)
-    settings[:, 1] %= 180.0
+    plane, views = in_plane(m)
+    settings = np.stack([np.round(m.theta_i_deg, _DECIMALS), plane], axis=1)
     values, member = np.unique(settings, axis=0, return_inverse=True)
     found = []
     for n, (theta_i, dphi) in enumerate(values):
         points = np.flatnonzero(member.reshape(-1) == n)
         if points.size > 1:
-            order = np.argsort(signed_view(m)[points], kind="stable")
+            order = np.argsort(views[points], kind="stable")
             found.append(Sweep(float(theta_i), float(dphi), points[order]))
     return found
 
 
 def in_plane(m: Measurements) -> tuple[FloatArray, FloatArray]:
     """dphi in degrees, 0 to below 180, and theta_r with the sign that it has in that plane."""
-    azimuth = np.mod(np.round(m.dphi_deg, 9), 360.0)
+    azimuth = np.mod(np.round(m.dphi_deg, _DECIMALS), 360.0)
     over = azimuth >= 180.0
     return np.where(over, azimuth - 180.0, azimuth), np.where(over, -m.theta_r_deg, m.theta_r_deg)
 

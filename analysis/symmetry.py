@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
-from analysis.covariance import Brdf, shared
+from analysis.covariance import Brdf, change, shared
 from analysis.measurements import Measurements
 from analysis.sweeps import in_plane, sweeps
 from instrument.geometry import FloatArray
@@ -91,12 +91,18 @@ def _pairs(m: Measurements) -> list[tuple[int, int]]:
 def _covariance(
     m: Measurements, smooth: Brdf, noise: float, pairs: list[tuple[int, int]]
 ) -> FloatArray:
-    """Covariance of the differences, (P, P)."""
+    """Covariance of the differences, (P, P).
+
+    All theta_r may be off alike by u, too: a zero that is off shifts the two sides apart, which
+    many points would show as asymmetry if the error of each were independent.
+    """
     D = np.zeros((len(pairs), m.size))
     for n, (lamp, mirror) in enumerate(pairs):
         D[n, lamp], D[n, mirror] = 1.0, -1.0
     if m.u_random is None:
         return np.asarray(noise**2 * (D @ D.T))
     C = shared(m, smooth)
-    common = D @ C.common
+    turned = np.where(in_plane(m)[1] == m.theta_r_deg, 1.0, -1.0)
+    zero = turned * change(m, smooth, theta_r=m.u_theta_r_deg)
+    common = D @ np.column_stack([C.common, zero])
     return np.asarray((D * C.variance) @ D.T + common @ common.T)

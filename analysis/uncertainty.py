@@ -2,7 +2,9 @@
 
 A standard uncertainty describes a parameter only where chi2 is about a parabola that fits into
 the parameter's domain. Elsewhere (on a bound, or where the data hardly depend on the parameter)
-the profile-likelihood interval is given instead.
+the profile-likelihood interval is given instead. So it is where a standard uncertainty rests on
+another parameter's lying on its bound: with an albedo of 1 that may as well be 0.5, a lobe's
+strength is not known.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ import numpy as np
 
 from analysis.descent import Minimum
 from analysis.interval import RISE_95, interval
+from analysis.models.base import BoolArray
 from analysis.problem import Problem
 from instrument.geometry import FloatArray
 
@@ -52,7 +55,9 @@ def uncertainty(
     `untied`: parameters that no reference ties down: not determined, whatever else may hint at
     them. Without `profiles` an interval is the whole domain.
     """
-    C, loose = _linear(problem, best.x, variance)
+    bound = (best.x == problem.low) | (best.x == problem.high)
+    C, loose = _linear(problem, best.x, variance, ~bound)
+    leaning = _leaning(problem, best.x, variance, C, bound)
     u: dict[str, float | None] = {}
     intervals: dict[str, tuple[float, float]] = {}
     undetermined = []
@@ -60,7 +65,8 @@ def uncertainty(
         linear = None if loose[i] else float(np.sqrt(C[i, i]))
         u[parameter.name] = linear
         tied = parameter.name not in untied
-        if tied and linear is not None and _inside(problem, best.x, i, 2 * linear):
+        firm = tied and linear is not None and not leaning[i]
+        if firm and _inside(problem, best.x, i, 2 * (linear or 0.0)):
             continue
         ends = parameter.low, parameter.high
         if profiles:
@@ -74,11 +80,25 @@ def uncertainty(
     return Uncertainty(u, intervals, tuple(undetermined), _correlation(C, list(u.values())))
 
 
-def _linear(problem: Problem, x: FloatArray, variance: float) -> tuple[FloatArray, FloatArray]:
-    """Linearised covariance of the parameters, (K, K), and which of them it does not hold for."""
-    loose = (x == problem.low) | (x == problem.high)
+def _leaning(
+    problem: Problem, x: FloatArray, variance: float, C: FloatArray, bound: BoolArray
+) -> BoolArray:
+    """Parameters whose u rests on others' being held on a `bound`, which may leave it."""
+    if not np.any(bound):
+        return bound
+    off = problem.off_level_bounds(x, range(x.size))
+    freed, loose = _linear(problem, off, variance, np.ones_like(bound))
+    wider = np.diag(freed) > _PARABOLA**2 * np.diag(C)
+    return np.asarray(wider | loose)
+
+
+def _linear(
+    problem: Problem, x: FloatArray, variance: float, varied: BoolArray
+) -> tuple[FloatArray, BoolArray]:
+    """Linearised covariance of the `varied` parameters, (K, K), and which it does not hold for."""
+    loose = ~varied
     C = np.full((x.size, x.size), np.nan)
-    free = np.flatnonzero(~loose)
+    free = np.flatnonzero(varied)
     if free.size == 0:
         return C, loose
     J = problem.jacobian(x, free.tolist())

@@ -27,8 +27,14 @@ from analysis.models.specular import off_mirror2
 from instrument.geometry import FloatArray, Geometry
 
 SCALE = Parameter("scale", "1", 0.0, 10.0, 0.1, scale=True)
-SIGMA_H = Parameter("sigma_h", "wavelengths", 0.0, 100.0, 0.5)
-CORRELATION_LENGTH = Parameter("correlation_length", "wavelengths", 0.1, 1000.0, 10.0)
+# Both lengths matter by their ratio to the wavelength: a fit tries decades.
+SIGMA_H = Parameter(
+    "sigma_h", "wavelengths", 0.0, 100.0, 0.5, starts=(0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 80.0)
+)
+CORRELATION_LENGTH = Parameter(
+    "correlation_length", "wavelengths", 0.1, 1000.0, 10.0,
+    starts=(0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 400.0),
+)  # fmt: skip
 
 K = 2 * math.pi  # the propagation constant (64), in 1/wavelength
 Weight = Callable[..., FloatArray]  # of m, g and q
