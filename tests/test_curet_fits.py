@@ -57,10 +57,10 @@ def test_a_model_chosen_for_real_matter_says_that_its_noise_is_an_estimate() -> 
 
 
 @pytest.mark.slow
-def test_the_automatic_choice_over_all_61_materials() -> None:
+def test_the_automatic_choice_over_the_materials(slow: bool) -> None:
+    """All 61 with `pytest --slow`; else every twelfth, of which the median is another figure."""
     rms = []
-    for sample in range(1, 62):
+    for sample in range(1, 62, 1 if slow else 12):
         choice = choose(read_curet(CURET, sample, 68.8).measurements)
         rms += [c.rms_relative for c in choice.candidates if c.model == choice.chosen]
-    assert len(rms) == 61
-    assert np.median(rms) <= 0.055
+    assert np.median(rms) <= (0.055 if slow else 0.08)
