@@ -104,7 +104,9 @@ def _simplest(
 
     def score(candidate: FitResult) -> float:
         if candidate.model not in scores:
-            scores[candidate.model] = held_out(candidate.problem, candidate.x, left_out)
+            scores[candidate.model] = held_out(
+                measurements, candidate.problem, candidate.x, left_out
+            )
         return scores[candidate.model]
 
     current, *larger = sorted(converged, key=lambda c: c.x.size)  # stable: the ladder's order

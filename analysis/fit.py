@@ -16,7 +16,7 @@ from analysis.acceptance import Acceptance, Brdf
 from analysis.averaging import Averaged, average
 from analysis.covariance import Covariance, shared
 from analysis.first_fit import FirstFit, first_fit
-from analysis.likelihood import UNLIKELY, aicc, bic, noise_variance, probability
+from analysis.likelihood import NOT_NORMAL, UNLIKELY, aicc, bic, noise_variance, probability
 from analysis.measurements import Measurements
 from analysis.models import MODELS, Model
 from analysis.models.base import BoolArray
@@ -26,9 +26,6 @@ from analysis.uncertainty import uncertainty
 from instrument.geometry import FloatArray, Geometry
 
 UNSETTLED = "the averaging over lamp and lens did not settle"
-
-# A robust fit sets residuals beyond this many u aside: of 10 000 good ones, one is.
-_OUTLIER = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +178,7 @@ def _result(m: Measurements, whole: Averaged, covariance: Covariance, hopeless: 
     scale = math.sqrt(noise) if m.u_random is None and problem.huber is None else 1.0
     pulls = covariance.pulls(residual)
     unshared = (residual - covariance.common @ pulls) / (covariance.u_independent * scale)
-    outliers = np.abs(unshared) > _OUTLIER if problem.huber else np.zeros(m.size, dtype=bool)
+    outliers = np.abs(unshared) > NOT_NORMAL if problem.huber else np.zeros(m.size, dtype=bool)
     good = ~outliers
     white = covariance.of(good).whiten(residual[good])
     chi2 = float(white @ white)

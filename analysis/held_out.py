@@ -46,13 +46,15 @@ def _blocks(values: FloatArray) -> list[BoolArray]:
     return [points for points in found if np.any(points)]
 
 
-def held_out(problem: Problem, x: FloatArray, left_out: list[BoolArray]) -> float:
-    """Sum over the folds of the whitened misses' sizes at the points left out of the fit.
+def held_out(m: Measurements, problem: Problem, x: FloatArray, left_out: list[BoolArray]) -> float:
+    """Sum over the folds of the misses' sizes at the points left out of the fit.
 
+    In units of u, or in 1/sr where no u is stated: a robust fit's own estimate would not compare.
     `x` is the fit to all points, from which those to fewer start.
     """
     total, enough = 0.0, _SETTLED * problem.chi2(x)
+    unit = 1.0 if m.u_random is not None else float(np.sqrt(np.mean(problem.covariance.variance)))
     for points in left_out:
         found = problem.of(~points).solve(x, enough=enough)
         total += float(np.sum(np.abs(problem.of(points).residual(found.x))))
-    return total
+    return total * unit

@@ -7,6 +7,7 @@ of its minimum: 3.84, the 95 % point of chi2 with one degree of freedom, gives 9
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,12 +15,15 @@ from scipy.optimize import brentq
 
 from analysis.descent import Minimum
 from analysis.problem import Problem
+from instrument.geometry import FloatArray
 
 RISE_95 = 3.84
 
 # The search for an end begins no nearer than this part of the domain, widens by this factor, and
 # stops at this part of the distance; the other parameters' chi2 is known to this part of `rise`.
 _NEAREST, _WIDEN, _RELATIVE, _SETTLED = 1e-9, 3.0, 0.01, 1e-3
+# What a shape changes over its whole domain counts as nothing below this part of what is allowed.
+_UNSEEN = 0.01
 
 
 def interval(
@@ -29,18 +33,38 @@ def interval(
 
     An end on a bound of the domain means that the data do not limit the parameter on that side.
     """
-    profile = _Profile(problem, best, index, rise, {float(best.x[index]): best})
+    solved = {float(best.x[index]): best}
+    profile = _Profile(problem, best, index, rise, _hidden(problem, best.x, index, rise), solved)
     return profile.end(float(problem.low[index])), profile.end(float(problem.high[index]))
+
+
+def _hidden(problem: Problem, x: FloatArray, index: int, rise: float) -> list[int]:
+    """The shapes that change nothing where the scale at `index` is as small as it may be."""
+    parameters = problem.model.parameters
+    shapes = [i for i, p in enumerate(parameters) if not p.scale and x[i] > p.low]
+    if not parameters[index].scale or not shapes:
+        return []
+    without = x.copy()
+    without[index] = problem.low[index]
+    slopes = np.linalg.norm(problem.jacobian(without, shapes), axis=0)
+    changes = slopes * (problem.high - problem.low)[shapes]
+    unseen = changes < _UNSEEN * math.sqrt(rise)
+    return [i for i, nothing in zip(shapes, unseen, strict=True) if nothing]
 
 
 @dataclass(frozen=True, slots=True)
 class _Profile:
-    """chi2 over one parameter, the others fitted anew; `solved` has what was found so far."""
+    """chi2 over one parameter, the others fitted anew; `solved` has what was found so far.
+
+    hidden: parameters that say nothing where this one is 0, as a lobe's width of its strength. At
+    their lower bounds even a strong lobe may lie unseen between the points.
+    """
 
     problem: Problem
     best: Minimum
     index: int
     rise: float
+    hidden: list[int]
     solved: dict[float, Minimum]
 
     def excess(self, value: float) -> float:
@@ -51,10 +75,9 @@ class _Profile:
         return math.sqrt(above) - math.sqrt(self.rise)
 
     def _solve(self, value: float) -> Minimum:
-        """The others fitted from where they were at the nearest value, or from the best fit."""
-        nearest = self.solved[min(self.solved, key=lambda known: abs(known - value))]
-        for start in (nearest, self.best):
-            x = start.x.copy()
+        """The others fitted from the first start that leads to where chi2 is allowed."""
+        for start in self._starts(value):
+            x = start.copy()
             x[self.index] = value
             at = Minimum(x, self.problem.chi2(x), True, "")
             if at.chi2 - self.best.chi2 > self.rise:  # else no need: a fit only lowers chi2
@@ -62,6 +85,15 @@ class _Profile:
             if at.chi2 - self.best.chi2 <= self.rise:
                 break
         return at
+
+    def _starts(self, value: float) -> Iterator[FloatArray]:
+        """What was found at the nearest value, the best fit, and what may lie hidden."""
+        yield self.solved[min(self.solved, key=lambda known: abs(known - value))].x
+        yield self.best.x
+        if self.hidden:
+            narrow = self.best.x.copy()
+            narrow[self.hidden] = self.problem.low[self.hidden]
+            yield narrow
 
     def end(self, bound: float) -> float:
         """The end towards a bound of the domain."""

@@ -13,11 +13,14 @@ from scipy.special import chdtrc
 from analysis.descent import Minimum, weights
 from analysis.measurements import Measurements
 from analysis.problem import Problem
+from instrument.geometry import FloatArray
 
 # No camera tells more: smaller residuals, relative to the mean BRDF, are rounding of the search.
 LEAST_NOISE = 1e-5
 # A model whose chi2 is less probable than this does not explain the data.
 UNLIKELY = 1e-3
+# Of 10 000 normal residuals one is beyond so many u: a robust fit sets such points aside.
+NOT_NORMAL = 4.0
 
 
 def probability(chi2: float, dof: int) -> float:
@@ -61,14 +64,28 @@ def floor(problem: Problem) -> float:
 def noise_variance(m: Measurements, problem: Problem, solution: Minimum) -> float:
     """Variance of the whitened residuals: 1 where u is stated, else estimated from them.
 
-    A robust fit's is Huber's (1981, section 7.6): what counting large residuals less costs.
+    A robust fit's is larger by what counting large residuals less costs.
     """
     spare = m.size - solution.x.size
     if problem.huber is not None and spare > 0:
         r = problem.residual(solution.x)
-        inside = float(np.mean(np.abs(r) <= problem.huber))
-        psi2 = float(np.sum(np.square(r * weights(r, problem.huber)))) / spare
-        return psi2 / max(inside, 0.5) ** 2
+        return _robust_variance(r, problem.huber, None if m.u_random is not None else spare)
     if m.u_random is not None:
         return 1.0
     return max(solution.chi2 / spare, floor(problem))
+
+
+def _robust_variance(r: FloatArray, limit: float, spare: int | None) -> float:
+    """Mean of psi^2 over the squared mean of its slope (Huber 1981, section 7.6).
+
+    From the residuals, for the `spare` degrees of freedom; with None from the normal distribution,
+    for the u is stated, and from the share of the residuals that are none of it.
+    """
+    if spare is not None:
+        psi2 = float(np.sum(np.square(r * weights(r, limit)))) / spare
+        return psi2 / max(float(np.mean(np.abs(r) <= limit)), 0.5) ** 2
+    wild = float(np.mean(np.abs(r) > NOT_NORMAL))
+    inside = math.erf(limit / math.sqrt(2))
+    density = math.exp(-(limit**2) / 2) / math.sqrt(2 * math.pi)
+    psi2 = inside - 2 * limit * density + limit**2 * (1 - inside)
+    return ((1 - wild) * psi2 + wild * limit**2) / max((1 - wild) * inside, 0.5) ** 2

@@ -1,7 +1,8 @@
 """How well a fit determines its parameters: standard uncertainties, or intervals where none holds.
 
 A standard uncertainty describes a parameter only where chi2 is about a parabola that fits into
-the parameter's domain. Elsewhere (on a bound, or where the data hardly depend on the parameter)
+the parameter's domain, which is tried 2 u to either side along the valley that the linearised fit
+expects. Elsewhere (on a bound, in a bent valley, or where the data hardly depend on the parameter)
 the profile-likelihood interval is given instead. So it is where a standard uncertainty rests on
 another parameter's lying on its bound: with an albedo of 1 that may as well be 0.5, a lobe's
 strength is not known.
@@ -57,25 +58,18 @@ def uncertainty(
     """
     bound = (best.x == problem.low) | (best.x == problem.high)
     C, loose = _linear(problem, best.x, variance, ~bound)
+    loose |= [p.name in untied for p in problem.model.parameters]
     leaning = _leaning(problem, best.x, variance, C, bound)
+    around = _Around(problem, best, variance, C, profiles)
     u: dict[str, float | None] = {}
     intervals: dict[str, tuple[float, float]] = {}
     undetermined = []
     for i, parameter in enumerate(problem.model.parameters):
-        linear = None if loose[i] else float(np.sqrt(C[i, i]))
-        u[parameter.name] = linear
-        tied = parameter.name not in untied
-        firm = tied and linear is not None and not leaning[i]
-        if firm and _inside(problem, best.x, i, 2 * (linear or 0.0)):
+        u[parameter.name], ends = around.known(i, bool(loose[i]), bool(leaning[i]))
+        if ends is None:
             continue
-        ends = parameter.low, parameter.high
-        if profiles:
-            ends = interval(problem, best, i, RISE_95 * variance)
-        if tied and linear is not None and _parabola(problem, float(best.x[i]), i, linear, ends):
-            continue
-        u[parameter.name] = None
         intervals[parameter.name] = ends
-        if not tied or ends[1] - ends[0] > (parameter.high - parameter.low) / 2:
+        if parameter.name in untied or ends[1] - ends[0] > around.half(i):
             undetermined.append(parameter.name)
     return Uncertainty(u, intervals, tuple(undetermined), _correlation(C, list(u.values())))
 
@@ -116,21 +110,60 @@ def _linear(
     return C, loose
 
 
-def _inside(problem: Problem, x: FloatArray, i: int, distance: float) -> bool:
-    return bool(problem.low[i] <= x[i] - distance and x[i] + distance <= problem.high[i])
+@dataclass(frozen=True, slots=True)
+class _Around:
+    """What is around a minimum: a parabola of covariance C, or something else."""
 
+    problem: Problem
+    best: Minimum
+    variance: float
+    C: FloatArray
+    profiles: bool
 
-def _parabola(problem: Problem, x: float, i: int, u: float, ends: tuple[float, float]) -> bool:
-    """Whether the ends that lie within the domain are where u says, and there is one."""
-    distances = [
-        abs(end - x)
-        for end, bound in zip(ends, (problem.low[i], problem.high[i]), strict=True)
-        if end != bound
-    ]
-    expected = np.sqrt(RISE_95) * u
-    return bool(distances) and all(
-        expected / _PARABOLA < d < expected * _PARABOLA for d in distances
-    )
+    def half(self, i: int) -> float:
+        """Half of a parameter's domain."""
+        return float(self.problem.high[i] - self.problem.low[i]) / 2
+
+    def known(
+        self, i: int, loose: bool, leaning: bool
+    ) -> tuple[float | None, tuple[float, float] | None]:
+        """A parameter's u, or None and the interval in which it lies."""
+        u = None if loose else float(np.sqrt(self.C[i, i]))
+        if u is not None and 2 * np.sqrt(RISE_95) * u > self.half(i):
+            u = None
+        if u is not None and not leaning and self.straight(i):
+            return u, None
+        ends = float(self.problem.low[i]), float(self.problem.high[i])
+        if self.profiles:
+            ends = interval(self.problem, self.best, i, RISE_95 * self.variance)
+        return (u, None) if u is not None and self.parabola(i, u, ends) else (None, ends)
+
+    def straight(self, i: int) -> bool:
+        """Whether chi2 rises 2 u away along the expected valley about as a parabola does."""
+        # What is not varied has no covariance.
+        step = 2 * np.nan_to_num(self.C[:, i]) / np.sqrt(self.C[i, i])
+        expected = 4 * self.variance
+        for x in (self.best.x - step, self.best.x + step):
+            if np.any((x < self.problem.low) | (self.problem.high < x)):
+                return False
+            rise = self.problem.chi2(x) - self.best.chi2
+            if not expected / _PARABOLA**2 < rise < expected * _PARABOLA**2:
+                return False
+        return True
+
+    def parabola(self, i: int, u: float, ends: tuple[float, float]) -> bool:
+        """Whether the ends are where u says; one of them may lie on a bound before that."""
+        expected = np.sqrt(RISE_95) * u
+        inside = 0
+        for end, bound in zip(ends, (self.problem.low[i], self.problem.high[i]), strict=True):
+            distance = abs(end - self.best.x[i])
+            if distance > expected * _PARABOLA:
+                return False
+            if end != bound:
+                inside += 1
+                if distance < expected / _PARABOLA:
+                    return False
+        return inside > 0
 
 
 def _correlation(C: FloatArray, u: list[float | None]) -> FloatArray:

@@ -112,7 +112,7 @@ def test_one_view_angle_leaves_nothing_out() -> None:
 def foretold(name: str, m: Measurements) -> float:
     """chi2 of the points that were left out of the model's fits."""
     fitted = first_fit(MODELS[name], m)
-    return held_out(fitted.problem, fitted.solution.x, folds(m))
+    return held_out(m, fitted.problem, fitted.solution.x, folds(m))
 
 
 def score(true: str, other: str, truth: dict[str, float], *, one: bool = False) -> FloatArray:
@@ -183,4 +183,4 @@ def test_one_outlier_counts_once() -> None:
     value[40] += 0.1
     m = Measurements.bare(theta_i, theta_r, dphi, value, 1e-3)
     found = first_fit(MODELS["lambert"], m)
-    assert 100 < held_out(found.problem, found.solution.x, folds(m)) < 100 + 96 * 100 / 64
+    assert 100 < held_out(m, found.problem, found.solution.x, folds(m)) < 100 + 96 * 100 / 64
