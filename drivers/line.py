@@ -1,0 +1,141 @@
+"""A serial line: bytes out, lines in, each with a deadline; what goes wrong names the port.
+
+pyserial's own behaviour on a lost port differs from call to call (`SerialException`, `OSError`,
+`termios.error`): here all of it is `PortGone`.
+"""
+
+from __future__ import annotations
+
+import termios
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import TypeVar
+
+from drivers.turns import Turns
+from instrument.errors import DeviceError
+
+REPLY_S = 0.25  # controllers answer within 10 to 50 ms; a stop waits no longer than this
+MOST_BYTES = 1024  # of a line: what is longer is noise
+
+A = TypeVar("A")
+T = TypeVar("T")
+
+
+class PortGone(DeviceError):
+    """The port vanished or cannot be used: unplugged, taken, forbidden."""
+
+
+class NoReply(DeviceError):
+    """The device did not answer in time."""
+
+
+class Garbled(DeviceError):
+    """What came is no answer to what was asked."""
+
+
+class Line:
+    """An open serial port. `who` names the device behind it in messages."""
+
+    def __init__(
+        self,
+        who: str,
+        port: str,
+        baudrate: int,
+        xonxoff: bool = False,
+        reply_s: float = REPLY_S,
+    ) -> None:
+        import serial
+
+        self.who, self.port, self.reply_s = who, port, reply_s
+        self.turns = Turns()
+        self._buffer = bytearray()
+        try:
+            self._serial = serial.serial_for_url(
+                port, baudrate=baudrate, timeout=reply_s, write_timeout=reply_s,
+                xonxoff=xonxoff, exclusive=True,
+            )  # fmt: skip
+        except (OSError, ValueError, termios.error) as error:
+            raise PortGone(
+                f"{who}: cannot open {port}: {error}: look at the cable, at who else has the port "
+                "open, and whether you are in the group that may use it (dialout)"
+            ) from error
+
+    def __enter__(self) -> Line:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the port; safe twice."""
+        try:
+            self._serial.close()
+        except (OSError, termios.error):
+            return  # it is gone already: nothing is left to let go of
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        self._guarded(self._serial.write, data)
+
+    def read_line(self, deadline_s: float) -> bytes:
+        """The next line without its end, NUL bytes dropped; `NoReply` past the monotonic deadline.
+
+        A controller whose motor supply was cut sends NULs.
+        """
+        while (end := self._buffer.find(b"\n")) < 0:
+            left_s = deadline_s - time.monotonic()
+            if left_s <= 0 or len(self._buffer) > MOST_BYTES:
+                raise self._no_line()
+            self._buffer += self._guarded(self._read, left_s)
+        line = bytes(self._buffer[:end])
+        del self._buffer[: end + 1]
+        return line.replace(b"\0", b"").strip(b"\r")
+
+    def drain(self, quiet_s: float) -> bytes:
+        """Throw away what comes until nothing has come for `quiet_s`; returns it.
+
+        A device that never stops talking raises `Garbled`.
+        """
+        thrown, self._buffer = bytes(self._buffer), bytearray()
+        last_s = time.monotonic()
+        while time.monotonic() - last_s < quiet_s:
+            more = self._guarded(self._read, quiet_s)
+            if more:
+                thrown, last_s = thrown + more, time.monotonic()
+            if len(thrown) > 100 * MOST_BYTES:
+                raise Garbled(
+                    f"{self.who}: {self.port} sends without end, as {thrown[:40]!r}: look at the "
+                    "baud rate and at what is connected there"
+                )
+        return thrown
+
+    def _read(self, timeout_s: float) -> bytes:
+        self._serial.timeout = timeout_s
+        first = bytes(self._serial.read(1))
+        return first + bytes(self._serial.read(self._serial.in_waiting)) if first else b""
+
+    def _no_line(self) -> DeviceError:
+        if self._buffer:
+            return Garbled(
+                f"{self.who}: no whole answer within {self.reply_s:g} s, only "
+                f"{bytes(self._buffer[:40])!r}: look at the baud rate and the cable of {self.port}"
+            )
+        return NoReply(
+            f"{self.who}: no answer within {self.reply_s:g} s: look at its power and at the cable "
+            f"of {self.port}"
+        )
+
+    def _guarded(self, action: Callable[[A], T], argument: A) -> T:
+        try:
+            return action(argument)
+        except (OSError, TypeError, termios.error) as error:  # TypeError: closed under our hands
+            raise PortGone(
+                f"{self.who}: {self.port} is gone ({error}): look at its USB plug and its power, "
+                "then go on"
+            ) from error
