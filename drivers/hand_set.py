@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from instrument.devices import Operator, Request
 from instrument.errors import DeviceError
 
@@ -37,8 +39,19 @@ class HandSetAxis:
             raise DeviceError(f"{self._name} is set by hand and has not been set yet")
         return self._angle_deg
 
+    def position_deg(self) -> float:
+        """The angle that was set, in degrees."""
+        return self.wait()
+
+    def limits_deg(self) -> tuple[float, float]:
+        """None of its own: the rig file's hold."""
+        return -math.inf, math.inf
+
     def stop(self) -> None:
         """A hand needs no stopping."""
+
+    def close(self) -> None:
+        """Nothing to let go of."""
 
 
 class HandCoveredLamp:

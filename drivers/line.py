@@ -49,6 +49,8 @@ class Line:
 
         self.who, self.port, self.reply_s = who, port, reply_s
         self.turns = Turns()
+        self.dirty = False
+        """Whether an answer is still owed: what comes next may belong to an earlier question."""
         self._buffer = bytearray()
         try:
             self._serial = serial.serial_for_url(
@@ -97,6 +99,29 @@ class Line:
         del self._buffer[: end + 1]
         return line.replace(b"\0", b"").strip(b"\r")
 
+    def exchange(self, request: bytes, pick: Callable[[bytes], T | None]) -> T:
+        """Send a request and return what `pick` makes of its answer, the first that it takes.
+
+        Other lines (an alert, a late answer to another question) are passed over. The caller has
+        the turn.
+        """
+        self.dirty = True
+        self.write(request)
+        deadline_s = time.monotonic() + self.reply_s
+        foreign = b""
+        while True:
+            try:
+                line = self.read_line(deadline_s)
+            except NoReply:
+                if foreign:
+                    raise self._garbled(foreign) from None
+                raise
+            found = pick(line)
+            if found is not None:
+                self.dirty = False
+                return found
+            foreign = line or foreign
+
     def drain(self, quiet_s: float) -> bytes:
         """Throw away what comes until nothing has come for `quiet_s`; returns it.
 
@@ -122,13 +147,16 @@ class Line:
 
     def _no_line(self) -> DeviceError:
         if self._buffer:
-            return Garbled(
-                f"{self.who}: no whole answer within {self.reply_s:g} s, only "
-                f"{bytes(self._buffer[:40])!r}: look at the baud rate and the cable of {self.port}"
-            )
+            return self._garbled(bytes(self._buffer))
         return NoReply(
             f"{self.who}: no answer within {self.reply_s:g} s: look at its power and at the cable "
             f"of {self.port}"
+        )
+
+    def _garbled(self, what: bytes) -> Garbled:
+        return Garbled(
+            f"{self.who}: no answer within {self.reply_s:g} s that makes sense, only "
+            f"{what[:40]!r}: look at the baud rate and at the cable of {self.port}"
         )
 
     def _guarded(self, action: Callable[[A], T], argument: A) -> T:

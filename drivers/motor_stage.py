@@ -28,7 +28,7 @@ class Limits:
     """What a stage may do, in the device's own degrees: the rig file's and its maker's numbers.
 
     `tolerance_deg`: how far from the target a move may end. `homing_s`: how long finding the
-    reference may take.
+    reference may take, `home_deg` where the stage stands then.
     """
 
     min_deg: float
@@ -37,6 +37,7 @@ class Limits:
     acceleration_deg_per_s2: float
     tolerance_deg: float
     homing_s: float
+    home_deg: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,9 @@ class Status:
 
 class MotorStage(ABC):
     """A stage behind a controller. Angles are the device's own degrees."""
+
+    KEEPS_REFERENCE = False
+    """Whether a controller that has its reference refuses to look for it again."""
 
     def __init__(self, name: str, limits: Limits, clock: Clock) -> None:
         self.name, self._limits, self._clock = name, limits, clock
@@ -82,8 +86,12 @@ class MotorStage(ABC):
         """Have the controller look for its reference."""
 
     @abstractmethod
+    def _apply_speed(self) -> None:
+        """Tell a controller that keeps its speed what the rig file says; after homing."""
+
+    @abstractmethod
     def _send_move(self, angle_deg: float) -> None:
-        """Have it move; returns when the controller is known to have taken the command."""
+        """Have it move, once. Where the answer is lost, the stage's own state tells."""
 
     @abstractmethod
     def _send_stop(self) -> None:
@@ -101,19 +109,29 @@ class MotorStage(ABC):
         return self.status().position_deg
 
     def home(self) -> None:
-        """Find the reference."""
-        self._refuse_fault(self.status())
+        """Find the reference and stand at home; a controller that keeps it only goes there."""
+        now = self.status()
+        self._refuse_fault(now)
+        if now.homed and self.KEEPS_REFERENCE:
+            self._apply_speed()
+            self.start_move(self._limits.home_deg)
+            self.wait()
+            return
+        self._look_for_reference(again=now.homed)
+        self._apply_speed()
+
+    def _look_for_reference(self, again: bool) -> None:
         self._stopped, self._target_deg = False, None
         self._send_home()
         self._stop_if_stopped()
-        begun_s = self._clock.now_s()
-        while not self._at_home(self.status()):
-            if self._clock.now_s() - begun_s > self._limits.homing_s:
+        watch = _Homing(self._limits.homing_s, self._clock.now_s(), again)
+        while not watch.ended(now := self._looked()):
+            if watch.not_begun(self._clock.now_s()):
+                self._send_home()  # it stands and has no reference: the command never arrived
+            wrong = watch.wrong(self._clock.now_s())
+            if wrong:
                 self.stop()
-                raise DeviceError(
-                    f"{self.name}: its reference was not found within {self._limits.homing_s:g} s: "
-                    "look at the reference switch, and whether something holds the stage"
-                )
+                raise DeviceError(f"{self.name}: {wrong}, at {now.position_deg:g} deg")
             self._clock.sleep(POLL_S)
 
     def start_move(self, angle_deg: float) -> None:
@@ -142,27 +160,31 @@ class MotorStage(ABC):
         if self._target_deg is None:
             return self.position_deg()
         watch = _Watch(self._limits, self._from_deg, self._target_deg, self._started_s)
-        while True:
-            now = self.status()
-            self._refuse_stop(now)
-            self._refuse_fault(now)
-            wrong = watch.wrong(now, self._clock.now_s())
+        while not watch.ended(now := self._looked()):
+            time_s = self._clock.now_s()
+            if watch.not_begun(time_s):
+                self._send_move(self._target_deg)  # it stands where it was: nothing arrived
+                self._stop_if_stopped()
+            wrong = watch.wrong(now, time_s)
             if wrong:
                 self.stop()
                 raise DeviceError(f"{self.name}: {wrong}")
-            if watch.ended(now):
-                return self._arrived(now)
             self._clock.sleep(POLL_S)
+        return self._arrived(now)
 
     def stop(self) -> None:
         """End all motion now; safe at any time, twice, and from another thread."""
         self._stopped = True
         self._send_stop()
 
-    def _at_home(self, now: Status) -> bool:
-        self._refuse_stop(now)
+    def _looked(self) -> Status:
+        """The status of a stage that neither has a fault nor was stopped; else `DeviceError`."""
+        now = self.status()
+        if self._stopped:
+            self._target_deg = None
+            raise Stopped(f"{self.name}: stopped at {now.position_deg:g} deg")
         self._refuse_fault(now)
-        return now.homed and not now.moving
+        return now
 
     def _arrived(self, now: Status) -> float:
         target, self._target_deg = self._target_deg, None
@@ -180,15 +202,42 @@ class MotorStage(ABC):
             self._send_stop()
             raise Stopped(f"{self.name}: stopped as it was about to move")
 
-    def _refuse_stop(self, now: Status) -> None:
-        if self._stopped:
-            self._target_deg = None
-            raise Stopped(f"{self.name}: stopped at {now.position_deg:g} deg")
-
     def _refuse_fault(self, now: Status) -> None:
         if now.fault:
             self._target_deg = None
             raise DeviceError(f"{self.name}: {now.fault}")
+
+
+class _Homing:
+    """Whether finding the reference goes as it should; `again`: it was known before."""
+
+    def __init__(self, allowed_s: float, started_s: float, again: bool) -> None:
+        self._allowed_s, self._started_s, self._known = allowed_s, started_s, again
+        self._moved = self._again = False
+
+    def ended(self, now: Status) -> bool:
+        """The reference is known and the stage stands."""
+        self._moved |= now.moving
+        self._known &= now.homed and not now.moving
+        return now.homed and not now.moving and not self._known
+
+    def not_begun(self, time_s: float) -> bool:
+        """Once: it should move by now, and does not."""
+        late = not self._moved and not self._again and time_s - self._started_s > STARTS_WITHIN_S
+        self._again |= late
+        return late
+
+    def wrong(self, time_s: float) -> str:
+        """What is wrong, or nothing."""
+        since_s = time_s - self._started_s
+        if not self._moved and since_s > 2 * STARTS_WITHIN_S:
+            return "did not begin to look for its reference: look at its motor's supply"
+        if since_s > self._allowed_s:
+            return (
+                f"its reference was not found within {self._allowed_s:g} s: look at the reference "
+                "switch, and whether something holds the stage"
+            )
+        return ""
 
 
 class _Watch:
@@ -198,32 +247,38 @@ class _Watch:
         self._limits, self._target, self._started_s = limits, target, started_s
         way = Trapezoid(target - start, limits.speed_deg_per_s, limits.acceleration_deg_per_s2)
         self._allowed_s = 1.5 * way.duration_s + 2.0
-        self._at, self._at_s = start, started_s
-        self._begun = False
+        self._start = self._at = start
+        self._at_s = started_s
+        self._begun = self._again = False
 
     def ended(self, now: Status) -> bool:
         """No longer moving, and not because it has not begun yet."""
+        self._begun |= now.moving or abs(now.position_deg - self._start) > self._step_deg
         return not now.moving and (self._begun or self._there(now))
+
+    def not_begun(self, time_s: float) -> bool:
+        """Once: it should move by now, and stands where it was."""
+        late = not self._begun and time_s - self._started_s > STARTS_WITHIN_S
+        once, self._again = late and not self._again, self._again or late
+        return once
 
     def wrong(self, now: Status, time_s: float) -> str:
         """What is wrong with the move, or nothing."""
-        self._begun |= now.moving
-        if abs(now.position_deg - self._at) > self._limits.tolerance_deg / 10:
+        if abs(now.position_deg - self._at) > self._step_deg:
             self._at, self._at_s = now.position_deg, time_s
         since_s = time_s - self._started_s
         where = f"at {now.position_deg:g} deg on the way to {self._target:g} deg"
         if now.moving and time_s - self._at_s > STALLED_S:
             return f"stalled {where}: look for what holds the stage, then home it"
+        if not self._begun and since_s > 2 * STARTS_WITHIN_S:
+            return f"did not begin to move, {where}: look at its motor's supply"
         if since_s > self._allowed_s:
             return f"still {where} after {since_s:.1f} s (allowed: {self._allowed_s:.1f} s)"
-        if (
-            not now.moving
-            and not self._begun
-            and since_s > STARTS_WITHIN_S
-            and not self._there(now)
-        ):
-            return f"did not begin to move, {where}: look at its motor's supply"
         return ""
+
+    @property
+    def _step_deg(self) -> float:
+        return self._limits.tolerance_deg / 10
 
     def _there(self, now: Status) -> bool:
         return abs(now.position_deg - self._target) <= self._limits.tolerance_deg

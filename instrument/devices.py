@@ -63,8 +63,20 @@ class Stage(Protocol):
         """Wait until the move has ended and return the position in degrees."""
         ...
 
+    def position_deg(self) -> float:
+        """Where the stage is, also while it moves."""
+        ...
+
+    def limits_deg(self) -> tuple[float, float]:
+        """The least and the largest angle that it will go to."""
+        ...
+
     def stop(self) -> None:
         """End all motion now; safe at any time, twice, and from another thread."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the device; safe twice."""
         ...
 
 
@@ -81,6 +93,10 @@ class Camera(Protocol):
 
     def grab(self, count: int) -> list[Frame]:
         """Take `count` frames whose exposure began after this call."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the device; safe twice."""
         ...
 
 

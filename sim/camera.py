@@ -58,6 +58,9 @@ class SimulatedCamera:
         mean, spread = self._mean_and_spread_dn()
         return [self._frame(mean, spread) for _ in range(count)]
 
+    def close(self) -> None:
+        """Nothing to let go of."""
+
     def _frame(self, mean: FloatImage, spread: FloatImage) -> Frame:
         self._clock.sleep(self._exposure_s + self._settings.frame_overhead_s)
         noise = self._normal()

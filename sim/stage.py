@@ -36,7 +36,7 @@ class SimulatedStage:
         """Begin to move; refuses before homing and past the limits of the rig file."""
         if not self._homed:
             raise DeviceError(f"stage {self._name}: not homed, so it must not move: home it first")
-        low, high = sorted(map(self._to_device, (self._axis.min_deg, self._axis.max_deg)))
+        low, high = self.limits_deg()
         if not low - 1e-9 <= angle_deg <= high + 1e-9:
             raise DeviceError(
                 f"stage {self._name}: {angle_deg:g} deg asked for; its limits are {low:g} to "
@@ -52,9 +52,22 @@ class SimulatedStage:
         self._clock.sleep(left_s)
         return self._arrive()
 
+    def position_deg(self) -> float:
+        """Where the stage is."""
+        return self._now_deg()
+
+    def limits_deg(self) -> tuple[float, float]:
+        """The rig file's limits."""
+        ends = map(self._to_device, (self._axis.min_deg, self._axis.max_deg))
+        low, high = sorted(ends)
+        return low, high
+
     def stop(self) -> None:
         """End the move where the axis is now."""
         self._arrive()
+
+    def close(self) -> None:
+        """Nothing to let go of."""
 
     def _arrive(self) -> float:
         self._position_deg = self._now_deg()

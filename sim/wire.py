@@ -1,4 +1,4 @@
-"""What an emulated controller hangs on: a pseudo-terminal or a TCP port, and what may go wrong there.
+"""What an emulated controller hangs on, a pseudo-terminal or a TCP port, and what goes wrong there.
 
 A controller turns the bytes that reach it into the bytes that it answers, by itself; a wire carries
 both, in a thread, and does to the answers what a test has asked for.
@@ -6,6 +6,7 @@ both, in a thread, and does to the answers what a test has asked for.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import select
 import socket
@@ -13,7 +14,7 @@ import threading
 import time
 import tty
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Literal, Protocol, Self
@@ -116,7 +117,7 @@ class _Wire:
             self._send(_SPOILT.get(fault.name, bytes)(answer))
 
 
-_SPOILT = {
+_SPOILT: dict[str, Callable[[bytes], bytes]] = {
     "garbage": lambda answer: bytes(0x80 | byte ^ 0x55 for byte in answer),
     "truncate": lambda answer: answer[: len(answer) // 2],
     "nul": lambda answer: b"\0\0" + answer[:3] + b"\0" + answer[3:],
@@ -185,8 +186,6 @@ class TcpWire(_Wire):
     def _unplug(self) -> None:
         for end in (self._peer, self._listener):
             if end is not None:
-                try:
+                with contextlib.suppress(OSError):  # not connected
                     end.shutdown(socket.SHUT_RDWR)
-                except OSError:
-                    pass  # not connected
                 end.close()
