@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+from instrument.axis_config import HandAxis, MotorAxis
 from instrument.clock import Clock
 from instrument.devices import Stage
 from instrument.errors import DeviceError
-from instrument.rig_config import HandAxis, SimulatedAxis
-
-LEAST_TOLERANCE_DEG = 0.01
 
 
 class Axis:
     """Moves a stage in the rig's degrees; refuses what the rig file does not allow."""
 
     def __init__(
-        self, name: str, stage: Stage, settings: HandAxis | SimulatedAxis, clock: Clock
+        self, name: str, stage: Stage, settings: HandAxis | MotorAxis, clock: Clock
     ) -> None:
         self.name, self._stage, self._settings, self._clock = name, stage, settings, clock
         self._target_deg = float("nan")
@@ -32,6 +30,10 @@ class Axis:
         """Find the reference."""
         self._stage.home()
 
+    def position_deg(self) -> float:
+        """Where the axis is."""
+        return self._settings.from_device_deg(self._stage.position_deg())
+
     def start_move(self, angle_deg: float) -> None:
         """Begin to move; past a limit of the rig file nothing is sent to the device."""
         low, high = self._settings.min_deg, self._settings.max_deg
@@ -41,12 +43,12 @@ class Axis:
                 f"{high:g} deg: nothing has moved"
             )
         self._target_deg = angle_deg
-        self._stage.start_move(self._settings.zero_deg + self._settings.sign * angle_deg)
+        self._stage.start_move(self._settings.to_device_deg(angle_deg))
 
     def finish_move(self) -> None:
         """Wait for the end of the move and check where the axis stands."""
-        reached = (self._stage.wait() - self._settings.zero_deg) * self._settings.sign
-        tolerance = max(3 * self._settings.u_deg, LEAST_TOLERANCE_DEG)
+        reached = self._settings.from_device_deg(self._stage.wait())
+        tolerance = self._settings.tolerance_deg
         if abs(reached - self._target_deg) > tolerance:
             raise DeviceError(
                 f"{self.name}: stands at {reached:g} deg instead of {self._target_deg:g} deg "
@@ -55,9 +57,13 @@ class Axis:
 
     def settle(self) -> None:
         """Let the axis come to rest."""
-        if isinstance(self._settings, SimulatedAxis):
+        if not isinstance(self._settings, HandAxis):
             self._clock.sleep(self._settings.settle_s)
 
     def stop(self) -> None:
         """End all motion now."""
         self._stage.stop()
+
+    def close(self) -> None:
+        """Let go of the device."""
+        self._stage.close()

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 
+from instrument.camera_config import Camera
 from instrument.protocol_config import Protocol
-from instrument.rig_config import Camera, Rig
+from instrument.rig_config import Rig
 
 STEP = math.sqrt(2.0)
 NEARLY_FULL = 0.97  # of full scale: beyond this the response is not trusted
@@ -17,10 +18,14 @@ NEARLY_FULL = 0.97  # of full scale: beyond this the response is not trusted
 def exposure_ladder_s(camera: Camera) -> tuple[float, ...]:
     """Every exposure that is ever used, in seconds: the camera's shortest times powers of sqrt 2.
 
-    Rounded to six digits, so that the same exposure always is the same number.
+    Rounded to the camera's own steps, or to six digits, so that the same exposure always is the
+    same number.
     """
     top = math.floor(math.log(camera.max_exposure_s / camera.min_exposure_s, STEP) + 1e-9)
-    return tuple(float(f"{camera.min_exposure_s * STEP**n:.6g}") for n in range(top + 1))
+    ideal = (camera.min_exposure_s * STEP**n for n in range(top + 1))
+    step_s = camera.exposure_step_s
+    exact = (round(e / step_s) * step_s if step_s else e for e in ideal)
+    return tuple(dict.fromkeys(float(f"{e:.6g}") for e in exact))
 
 
 def longest_below(limit_s: float, camera: Camera) -> float:

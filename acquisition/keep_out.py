@@ -6,8 +6,9 @@ import math
 from collections.abc import Iterator
 from typing import Protocol
 
+from instrument.axis_config import AXES
 from instrument.geometry import camera_to_lamp_deg
-from instrument.rig_config import AXES, KeepOut
+from instrument.rig_config import KeepOut
 
 
 class Angles(Protocol):

@@ -13,9 +13,10 @@ from itertools import permutations
 from typing import NamedTuple
 
 from acquisition.keep_out import obstacle
+from instrument.axis_config import AXES, HandAxis
 from instrument.errors import InputError
 from instrument.kinematics import Trapezoid
-from instrument.rig_config import AXES, HandAxis, Rig
+from instrument.rig_config import Rig
 
 SAME_DEG = 1e-9  # two angles closer than this are one: far below what any stage resolves
 

@@ -12,13 +12,14 @@ from dataclasses import dataclass, replace
 
 from acquisition.exposure import expected_exposure_s, exposure_ladder_s
 from acquisition.motion import Move, NoPathError, Pose, home_pose, moves_between
+from instrument.axis_config import AXES, HandAxis
 from instrument.config import Loaded
 from instrument.devices import Surface
 from instrument.errors import InputError
 from instrument.geometry import camera_to_lamp_deg, cone_half_angle_deg
 from instrument.protocol_config import Protocol, Sweep, angles_deg
 from instrument.record import Kind
-from instrument.rig_config import AXES, HandAxis, Rig
+from instrument.rig_config import Rig
 from instrument.yaml_marks import place
 
 

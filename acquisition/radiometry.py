@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from acquisition.exposure import NEARLY_FULL
 from acquisition.window import Window
+from instrument.camera_config import Camera
 from instrument.devices import Frame, Image
 from instrument.geometry import FloatArray
-from instrument.rig_config import Camera
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,10 +11,11 @@ from acquisition.reduction import Reduced
 from acquisition.remarks import Budget, parameters_of
 from analysis.fit import FitResult
 from analysis.report_data import Candidate, Curve, ReportData
+from instrument.axis_config import AXES
 from instrument.config import Loaded
 from instrument.geometry import FloatArray, Geometry
 from instrument.record import Record
-from instrument.rig_config import AXES, Rig
+from instrument.rig_config import Rig
 
 Rows = tuple[tuple[str, str], ...]
 

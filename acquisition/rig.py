@@ -5,11 +5,11 @@ from __future__ import annotations
 from acquisition.axis import Axis
 from acquisition.engine import Devices
 from drivers.hand_set import HandCoveredLamp, HandSetAxis
+from instrument.axis_config import AXES, HandAxis
 from instrument.clock import Clock
 from instrument.config import Loaded
 from instrument.devices import Lamp, Operator, Stage
 from instrument.errors import InputError
-from instrument.rig_config import AXES, HandAxis
 from sim.camera import SimulatedCamera
 from sim.clock import SimulatedClock
 from sim.operator import SimulatedOperator, SimulatedShutter

@@ -24,7 +24,8 @@ from instrument.protocol_config import (
     own_mistakes,
     rig_mistakes,
 )
-from instrument.rig_config import Rig, Section
+from instrument.rig_config import Rig
+from instrument.section import Section
 from instrument.yaml_marks import (
     MAX_BYTES,
     KeyPath,

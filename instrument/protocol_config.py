@@ -14,8 +14,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Discriminator, Field, Tag, TypeAdapter, ValidationError
 
+from instrument.axis_config import AXES, EMULATED, Axis
 from instrument.geometry import FloatArray
-from instrument.rig_config import AXES, Axis, Finite, Name, NotNegative, Positive, Section
+from instrument.section import Finite, Name, NotNegative, Positive, Section
 from instrument.yaml_marks import KeyPath, MarkedYaml
 
 SweepKey = Literal["theta_i_deg", "dphi_deg", "theta_r_deg"]
@@ -186,7 +187,10 @@ def rig_mistakes(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -> Mistak
                     f"{limits.min_deg:g} to {limits.max_deg:g} deg ({place})",
                 )
     yield from _window_past_picture(protocol, rig, rig_name)
-    if rig.get(("camera", "driver")) == "simulated" and protocol.get(("simulated_sample",)) is None:
+    scene = rig.get(("camera", "driver")) == "simulated" or (
+        rig.get(("camera", "device")) == EMULATED
+    )
+    if scene and protocol.get(("simulated_sample",)) is None:
         text = f"is missing; the rig {rig_name} is simulated and needs to know what to show"
         yield ("simulated_sample",), text
 

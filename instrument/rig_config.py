@@ -6,87 +6,13 @@ pydantic models (strict, frozen, unknown keys refused); read them with `instrume
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field
 
-AXES = ("theta_i", "dphi", "theta_r")
-AxisName = Literal["theta_i", "dphi", "theta_r"]
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Name = Annotated[str, Field(min_length=1, max_length=200)]
-
-
-class Section(BaseModel):
-    """A block of a configuration file: frozen, strict, without unknown keys."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-    def mistakes(self) -> Iterator[tuple[str, str]]:
-        """Values that do not go together: the key to point at, and what is wrong with it."""
-        yield from ()
-
-    @model_validator(mode="after")
-    def _goes_together(self) -> Self:
-        found = list(self.mistakes())
-        if found:
-            text = "; ".join(f"{key}: {what}" for key, what in found)
-            raise PydanticCustomError("together", "{text}", {"text": text, "found": found})
-        return self
-
-
-class _Axis(Section):
-    min_deg: Finite
-    max_deg: Finite
-    zero_deg: Finite = 0.0
-    sign: Literal[1, -1] = 1
-    u_deg: NotNegative
-
-    def mistakes(self) -> Iterator[tuple[str, str]]:
-        """The limits stand in order."""
-        if self.min_deg >= self.max_deg:
-            yield "min_deg", f"{self.min_deg:g}; allowed: less than max_deg {self.max_deg:g}"
-
-
-class HandAxis(_Axis):
-    """An axis that the operator sets by hand; `set_s` is how long that takes."""
-
-    driver: Literal["hand"]
-    set_s: NotNegative = 60.0
-
-
-class SimulatedAxis(_Axis):
-    """A simulated motor; its device reads zero_deg when the axis stands at 0.
-
-    `home_deg` is where the axis stands after homing, which takes `homing_s`.
-    """
-
-    driver: Literal["simulated"]
-    speed_deg_per_s: Positive
-    acceleration_deg_per_s2: Positive
-    settle_s: NotNegative
-    backlash_deg: NotNegative = 0.0
-    home_deg: Finite = 0.0
-    homing_s: NotNegative = 5.0
-
-
-Axis = Annotated[HandAxis | SimulatedAxis, Field(discriminator="driver")]
-
-
-class Axes(Section):
-    """The three axes: where the lamp stands (theta_i, dphi) and where the camera (theta_r)."""
-
-    theta_i: Axis
-    dphi: Axis
-    theta_r: Axis
-
-    def __getitem__(self, name: str) -> HandAxis | SimulatedAxis:
-        axis: HandAxis | SimulatedAxis = getattr(self, name)
-        return axis
-
+from instrument.axis_config import AXES, EMULATED, Axes, HandAxis, SimulatedAxis
+from instrument.camera_config import AnyCamera, SimulatedCamera
+from instrument.section import Finite, Name, NotNegative, Positive, Section
 
 _RANGES = ("theta_i_deg", "dphi_deg", "theta_r_deg")
 Range = Annotated[list[Finite], Field(min_length=2, max_length=2)]
@@ -116,72 +42,25 @@ class KeepOut(Section):
                 yield key, f"[{low:g}, {high:g}]; allowed: [low, high]"
 
 
-class Camera(Section):
-    """The camera on the beam: picture, electrons, exposure."""
-
-    driver: Literal["simulated"]
-    width_px: Annotated[int, Field(ge=16, le=16384)]
-    height_px: Annotated[int, Field(ge=16, le=16384)]
-    field_width_mm: Positive
-    axis_row_px: Finite
-    axis_column_px: Finite
-    roll_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
-    bit_depth: Annotated[int, Field(ge=8, le=16)]
-    full_well_electrons: Positive
-    read_noise_electrons: NotNegative
-    dark_current_electrons_per_s: NotNegative
-    black_level_dn: NotNegative = 0.0
-    min_exposure_s: Positive
-    max_exposure_s: Positive
-    frame_overhead_s: NotNegative
-
-    def mistakes(self) -> Iterator[tuple[str, str]]:
-        """Exposures in order, the axis inside the picture, room above the black level."""
-        if self.min_exposure_s > self.max_exposure_s:
-            yield (
-                "min_exposure_s",
-                f"{self.min_exposure_s:g}; allowed: at most max_exposure_s {self.max_exposure_s:g}",
-            )
-        for key, size in (("axis_row_px", self.height_px), ("axis_column_px", self.width_px)):
-            value = getattr(self, key)
-            if not 0 <= value <= size - 1:
-                yield key, f"{value:g} lies outside the picture; allowed: 0 to {size - 1}"
-        if self.black_level_dn >= self.max_dn / 2:
-            yield (
-                "black_level_dn",
-                f"{self.black_level_dn:g}; allowed: less than half of full scale, {self.max_dn} DN",
-            )
-        least = 4 * self.read_noise_electrons / self.electrons_per_dn
-        if self.black_level_dn < least:
-            yield (
-                "black_level_dn",
-                f"{self.black_level_dn:g}; allowed: at least {least:.3g}, 4 times the read noise "
-                "in counts, or darks are cut off at 0",
-            )
-
-    @property
-    def max_dn(self) -> int:
-        """The largest count that a pixel can give."""
-        return int(2**self.bit_depth - 1)
-
-    @property
-    def electrons_per_dn(self) -> float:
-        """Conversion gain: the full well fills the counts above the black level."""
-        return self.full_well_electrons / (self.max_dn - self.black_level_dn)
-
-
 class Lamp(Section):
     """The lamp; `shutter` darkens it by itself, `hand` asks the operator to cover it.
+
+    A `manual` lamp is a real one that a person serves.
 
     `white_electrons_per_s`: what a pixel collects from a perfect white diffuser lit at normal
     incidence: from it the first exposure and the duration of a scan are predicted.
     """
 
-    driver: Literal["simulated"]
+    driver: Literal["simulated", "manual"]
     darkened_by: Literal["shutter", "hand"]
     shutter_s: NotNegative = 0.1
     cover_s: NotNegative = 15.0
     white_electrons_per_s: Positive
+
+    def mistakes(self) -> Iterator[tuple[str, str]]:
+        """A real lamp has no shutter that this program could drive."""
+        if self.driver == "manual" and self.darkened_by != "hand":
+            yield "darkened_by", f"{self.darkened_by}; allowed for a manual lamp: hand"
 
 
 class Simulation(Section):
@@ -210,12 +89,43 @@ class Rig(Section):
     u_placement_mm: NotNegative = 0.0
     swap_s: NotNegative = 60.0
     axes: Axes
-    keep_out: list[KeepOut] = []
-    camera: Camera
+    keep_out: list[KeepOut] = Field(default_factory=list)
+    camera: AnyCamera
     lamp: Lamp
     simulation: Simulation = Simulation()
 
+    def mistakes(self) -> Iterator[tuple[str, str]]:
+        """One scene for all: simulated, emulated or real devices do not mix."""
+        kinds = dict(self._kinds())
+        if len(set(kinds.values())) > 1:
+            what = ", ".join(f"{name} is {kind}" for name, kind in kinds.items())
+            yield "axes", f"{what}; allowed: all simulated, all emulated or all real"
+
+    def _kinds(self) -> Iterator[tuple[str, str]]:
+        for name in AXES:
+            axis = self.axes[name]
+            if isinstance(axis, SimulatedAxis):
+                yield f"axis {name}", "simulated"
+            elif not isinstance(axis, HandAxis):
+                yield f"axis {name}", "emulated" if axis.port == EMULATED else "real"
+        if isinstance(self.camera, SimulatedCamera):
+            yield "camera", "simulated"
+        else:
+            yield "camera", "emulated" if self.camera.device == EMULATED else "real"
+        if (self.lamp.driver == "manual") != self.real:
+            yield "lamp", "real" if self.lamp.driver == "manual" else "simulated"
+
+    @property
+    def emulated(self) -> bool:
+        """Whether real drivers talk to emulated devices."""
+        return not self.simulated and getattr(self.camera, "device", "") == EMULATED
+
     @property
     def simulated(self) -> bool:
-        """Whether the scene is simulated: then it also answers the operator's prompts."""
-        return self.camera.driver == "simulated"
+        """Whether the devices are simulated as a whole."""
+        return isinstance(self.camera, SimulatedCamera)
+
+    @property
+    def real(self) -> bool:
+        """Whether there is a bench; else a simulated scene, which also answers the prompts."""
+        return not self.simulated and not self.emulated

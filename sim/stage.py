@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from instrument.axis_config import SimulatedAxis
 from instrument.clock import Clock
 from instrument.errors import DeviceError
 from instrument.kinematics import Trapezoid
-from instrument.rig_config import SimulatedAxis
 from sim.scene import Scene
 
 
@@ -28,7 +28,7 @@ class SimulatedStage:
         """Find the reference."""
         self._clock.sleep(self._axis.homing_s)
         self._homed = True
-        self._position_deg = self._to_device(self._axis.home_deg)
+        self._position_deg = self._axis.to_device_deg(self._axis.home_deg)
         self._move = self._over(0.0)
         self._write_scene()
 
@@ -58,9 +58,7 @@ class SimulatedStage:
 
     def limits_deg(self) -> tuple[float, float]:
         """The rig file's limits."""
-        ends = map(self._to_device, (self._axis.min_deg, self._axis.max_deg))
-        low, high = sorted(ends)
-        return low, high
+        return self._axis.device_limits_deg()
 
     def stop(self) -> None:
         """End the move where the axis is now."""
@@ -82,9 +80,5 @@ class SimulatedStage:
     def _now_deg(self) -> float:
         return self._position_deg + self._move.travelled_deg(self._clock.now_s() - self._started_s)
 
-    def _to_device(self, angle_deg: float) -> float:
-        return self._axis.zero_deg + self._axis.sign * angle_deg
-
     def _write_scene(self) -> None:
-        angle_deg = (self._position_deg - self._axis.zero_deg) * self._axis.sign
-        self._scene.set_axis(self._name, angle_deg)
+        self._scene.set_axis(self._name, self._axis.from_device_deg(self._position_deg))

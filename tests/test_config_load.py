@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from instrument.axis_config import HandAxis
 from instrument.config import MAX_REPORTED, Loaded, load_protocol, load_rig
 from instrument.errors import InputError
 from instrument.protocol_config import Protocol, Steps
-from instrument.rig_config import HandAxis
 
 RIG = """\
 name: small

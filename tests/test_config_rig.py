@@ -15,22 +15,25 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
+DRIVERS = "hand or newport or oriental or simulated or zaber"
+
 RIG_MISTAKES = {
     "driver missing": (
         "dphi: {driver: hand, ",
         "dphi: {",
-        "8:9: axes.dphi.driver: is missing; allowed: hand or simulated",
+        "8:9: axes.dphi.driver: is missing; allowed: " + DRIVERS,
     ),
     "driver unknown": (
         "dphi: {driver: hand",
         "dphi: {driver: hands",
-        "8:18: axes.dphi.driver: 'hands' is none of these; allowed: hand or simulated"
-        " (did you mean hand?)",
+        "8:18: axes.dphi.driver: 'hands' is none of these; allowed: "
+        + DRIVERS
+        + " (did you mean hand?)",
     ),
     "no axis": (
         "dphi: {driver: hand, min_deg: 0.0, max_deg: 180.0, u_deg: 0.1}",
         "dphi: 4",
-        "8:9: axes.dphi: 4 is a number; allowed: a block with driver: hand or simulated",
+        "8:9: axes.dphi: 4 is a number; allowed: a block with driver: " + DRIVERS,
     ),
     "key of another driver": (
         "max_deg: 180.0",

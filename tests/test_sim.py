@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from conftest import CONFIGS, changed, exact_rig
 
+from instrument.axis_config import SimulatedAxis
 from instrument.config import Loaded, load_protocol
 from instrument.devices import Request
 from instrument.errors import DeviceError
 from instrument.pinhole import Pinhole, area_per_pixel_mm2
-from instrument.rig_config import SimulatedAxis
 from sim.camera import SimulatedCamera
 from sim.clock import SimulatedClock
 from sim.operator import SimulatedOperator
