@@ -102,6 +102,62 @@ def report(folder: RunFolder, json: Json = False) -> None:
     _do("report_run", folder, json)
 
 
+RigOnly = Annotated[Path | None, typer.Option("--rig", help="The rig file.")]
+Yes = Annotated[bool, typer.Option("--yes", help="The rig is clear and may move: do not ask.")]
+AxisName = Annotated[str, typer.Argument(help="theta_i, dphi or theta_r.")]
+_BENCH = "acquisition.bench_commands"
+
+
+@app.command()
+def devices(
+    rig: RigOnly = None,
+    identify: Annotated[
+        bool, typer.Option("--identify", help="Ask every serial port who is there.")
+    ] = False,
+) -> None:
+    """List serial ports and cameras; with --rig, open the rig's devices and say who answers.
+
+    --identify sends each known controller's question to every port: not to ports of other machines.
+    """
+    _do("list_devices", rig, identify, module=_BENCH)
+
+
+@app.command()
+def home(axis: AxisName, rig: RigOnly = None, yes: Yes = False) -> None:
+    """Have an axis look for its reference. It moves."""
+    _do("home_axis", axis, rig, yes, module=_BENCH)
+
+
+@app.command(context_settings={"ignore_unknown_options": True})
+def move(
+    axis: AxisName,
+    angle_deg: Annotated[float, typer.Argument(help="Where to, in the rig's degrees.")],
+    rig: RigOnly = None,
+    yes: Yes = False,
+) -> None:
+    """Move one axis, after homing. Keep-out zones are not checked: only one axis is known."""
+    _do("move_axis", axis, angle_deg, rig, yes, module=_BENCH)
+
+
+@app.command()
+def grab(
+    out: Annotated[Path, typer.Option("--out", "-o", help="A .png (drawn on) or .tiff (raw).")],
+    rig: RigOnly = None,
+    protocol: Annotated[
+        Path | None, typer.Option(help="Take rig and measuring window from this protocol.")
+    ] = None,
+    theta_r_deg: Annotated[
+        float, typer.Option(help="Where the camera stands, for the window's outline.")
+    ] = 0.0,
+    exposure_s: Annotated[
+        float | None, typer.Option(help="Exposure in seconds. Default: the camera's shortest.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Take one frame for aiming, with the measuring window drawn on it. Nothing moves."""
+    _do("grab_frame", rig, protocol, theta_r_deg, exposure_s, out, json, module=_BENCH)
+
+
 def main() -> None:
     """Entry point of the `gonio` command."""
     signal.signal(signal.SIGTERM, _as_interrupt)

@@ -80,7 +80,7 @@ def print_plan(loaded: Loaded, plan: Plan) -> None:
 def _plan_rows(loaded: Loaded, plan: Plan) -> Iterator[tuple[str, str]]:
     tiles = sum(step.kind == "tile" for step in plan.steps)
     drifts = sum(step.kind == "drift" for step in plan.steps)
-    yield "rig", f"{loaded.rig.name} ({'simulated' if loaded.rig.simulated else 'real'})"
+    yield "rig", f"{loaded.rig.name} ({loaded.rig.kind})"
     yield "geometries", f"{len(plan.points)} to measure"
     hidden = ", ".join(f"({p.theta_i:g}, {p.dphi:g}, {p.theta_r:g})" for p in plan.hidden[:6])
     more = " …" if len(plan.hidden) > 6 else ""

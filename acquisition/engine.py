@@ -30,7 +30,10 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Devices:
-    """What the engine drives. `begin_step` tells a simulated scene which step comes next."""
+    """What the engine drives. `begin_step` tells a simulated scene which step comes next.
+
+    `close` lets go of them all.
+    """
 
     axes: dict[str, Axis]
     camera: Camera
@@ -38,6 +41,7 @@ class Devices:
     operator: Operator
     clock: Clock
     begin_step: Callable[[int], None]
+    close: Callable[[], None] = lambda: None
 
 
 class Engine:
@@ -108,7 +112,8 @@ class Engine:
                 axis.start_move(move.angle_deg)
             axis.finish_move()
             if axis.by_hand:
-                self._event("operator", f"{move.axis} set to {move.angle_deg:g} deg")
+                said = axis.position_deg()
+                self._event("operator", f"{move.axis} set to {said:g} deg")
         for name in dict.fromkeys(move.axis for move in moves):
             self._devices.axes[name].settle()
 
@@ -138,7 +143,7 @@ class Engine:
             self._protocol.window.min_pixels,
         )
         preview = preview_of(exposed, window, self._rig.camera.max_dn) if step.preview else None
-        self._record.add_reading(_reading(exposed, window, signal), preview)
+        self._record.add_reading(_reading(exposed, window, signal), preview, exposed.frames)
         self._on_step(step)
 
     def _make_safe(self) -> None:

@@ -75,7 +75,7 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
     """What else the operator should know."""
     tile = "the white tile is taken as Lambertian" if reduced.shared_by_tile else ""
     found = (
-        "all data are simulated" if loaded.rig.simulated else "",
+        "" if loaded.rig.real else "all data are simulated",
         _unfinished_note(record),
         fitted.reason if fitted.choice is not None else "",
         _hidden_note(record),

@@ -1,20 +1,28 @@
-"""The one place that chooses real or simulated devices: a rig file in, open devices out."""
+"""The one place that chooses real, emulated or simulated devices, by the rig file."""
 
 from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import replace
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
 
 from acquisition.axis import Axis
 from acquisition.engine import Devices
 from drivers.hand_set import HandCoveredLamp, HandSetAxis
-from instrument.axis_config import AXES, HandAxis
-from instrument.clock import Clock
+from instrument.axis_config import AXES, HandAxis, SimulatedAxis, Wired
+from instrument.camera_config import V4l2Camera
+from instrument.clock import Clock, SystemClock
 from instrument.config import Loaded
-from instrument.devices import Lamp, Operator, Stage
+from instrument.devices import Camera, Lamp, Operator, Stage
 from instrument.errors import InputError
-from sim.camera import SimulatedCamera
+from instrument.rig_config import Rig
 from sim.clock import SimulatedClock
 from sim.operator import SimulatedOperator, SimulatedShutter
 from sim.scene import Scene
-from sim.stage import SimulatedStage
+
+if TYPE_CHECKING:
+    from sim.emulated import EmulatedBench
 
 WORDS = {
     "theta_i": "the lamp's angle of incidence",
@@ -23,45 +31,145 @@ WORDS = {
 }
 
 
-def open_devices(loaded: Loaded, elapsed_s: float = 0.0) -> Devices:
-    """Open every device of the rig file. The simulated scene answers the operator's prompts.
+def prepare(loaded: Loaded) -> None:
+    """What has to be so before a run's folder is made.
 
-    `elapsed_s` is the time that the scan has taken already: the simulated lamp has aged by it.
+    Raises `InputError` where a real rig has no terminal at which somebody serves it.
     """
+    if loaded.rig.real:
+        from acquisition.terminal import require_terminal
+
+        require_terminal(str(loaded.protocol_path))
+    see_emulated_camera(loaded.rig)
+
+
+def see_emulated_camera(rig: Rig) -> None:
+    """Start the program again, once, where its camera is emulated: see `sim.emulated`."""
+    if rig.emulated:
+        from sim.emulated import restart_with_camera
+
+        restart_with_camera()
+
+
+def open_devices(loaded: Loaded, elapsed_s: float = 0.0) -> Devices:
+    """Open every device of the rig file, and close them all again if one cannot be opened.
+
+    A scene that is simulated answers the operator's prompts. `elapsed_s` is the time that the scan
+    has taken already: the simulated lamp has aged by it.
+    """
+    with ExitStack() as opening:
+        bench = opening.enter_context(Bench(loaded, elapsed_s))
+        axes = {name: bench.axis(name) for name in AXES}
+        camera, step = bench.camera(), bench.begin_step
+        devices = Devices(axes, camera, bench.lamp, bench.operator, bench.clock, step)
+        return replace(devices, close=opening.pop_all().close)
+
+
+class Bench:
+    """What a rig file describes; each device is opened when it is asked for. Use it with `with`."""
+
+    def __init__(self, loaded: Loaded, elapsed_s: float = 0.0) -> None:
+        from drivers.opening import Lines
+
+        self._rig, self._closing = loaded.rig, ExitStack()
+        self._scene = None if self._rig.real else _scene(loaded)
+        self.clock: Clock = SimulatedClock(elapsed_s) if self._rig.simulated else SystemClock()
+        self.operator = self._operator()
+        self.lamp = self._lamp()
+        self._lines = self._closing.enter_context(Lines(self.clock))
+        self._emulated = self._emulate(elapsed_s) if self._rig.emulated else None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._closing.close()
+
+    def axis(self, name: str) -> Axis:
+        """One axis, open."""
+        stage = self._stage(name)
+        self._closing.callback(stage.close)
+        return Axis(name, stage, self._rig.axes[name], self.clock)
+
+    def camera(self) -> Camera:
+        """The camera, open."""
+        if isinstance(self._rig.camera, V4l2Camera):
+            from drivers.opening import open_camera
+
+            settings = self._rig.camera
+            device = self._emulated.plug_camera(settings) if self._emulated else settings.device
+            camera: Camera = open_camera(settings, device, self.clock)
+        else:
+            from sim.camera import SimulatedCamera
+
+            camera = SimulatedCamera(self._simulated(), self.clock)
+        self._closing.callback(camera.close)
+        return camera
+
+    def begin_step(self, step: int) -> None:
+        """Tell a simulated scene which step comes next; a real bench need not know."""
+        if self._scene is not None:
+            self._scene.begin_step(step)
+
+    def stand_at(self, theta_r_deg: float) -> None:
+        """Have a simulated scene stand so that something is to be seen; nothing real moves."""
+        if self._scene is not None:
+            for name, angle_deg in (("theta_i", 30.0), ("dphi", 0.0), ("theta_r", theta_r_deg)):
+                self._scene.set_axis(name, angle_deg)
+
+    def _stage(self, name: str) -> Stage:
+        settings = self._rig.axes[name]
+        if isinstance(settings, HandAxis):
+            return HandSetAxis(name, WORDS[name], self.operator, settings.tolerance_deg)
+        if isinstance(settings, SimulatedAxis):
+            from sim.stage import SimulatedStage
+
+            return SimulatedStage(name, settings, self._simulated(), self.clock)
+        return self._driven(name, settings)
+
+    def _driven(self, name: str, settings: Wired) -> Stage:
+        from drivers.opening import open_stage
+
+        port = self._emulated.plug_axis(name, settings) if self._emulated else settings.port
+        return open_stage(name, settings, port, self._lines)
+
+    def _operator(self) -> Operator:
+        if self._scene is None:
+            from acquisition.terminal import TerminalOperator
+
+            return TerminalOperator()
+        # In real time too nobody waits for an operator who is simulated.
+        clock = self.clock if self._rig.simulated else SimulatedClock()
+        return SimulatedOperator(self._scene, clock)
+
+    def _lamp(self) -> Lamp:
+        if self._scene is None or self._rig.lamp.darkened_by == "hand":
+            return HandCoveredLamp(self.operator)
+        return SimulatedShutter(self._scene, self.clock)
+
+    def _emulate(self, elapsed_s: float) -> EmulatedBench:
+        from sim.emulated import EmulatedBench
+
+        emulated = EmulatedBench(self._simulated(), self.clock, elapsed_s)
+        self._closing.callback(emulated.close)
+        return emulated
+
+    def _simulated(self) -> Scene:
+        if self._scene is None:
+            raise InputError(f"{self._rig.name}: simulated and real devices do not mix")
+        return self._scene
+
+
+def _scene(loaded: Loaded) -> Scene:
     sample = loaded.protocol.simulated_sample
     if sample is None:
         raise InputError(
             f"{loaded.protocol_path}: simulated_sample: missing, but the rig {loaded.rig_path} is "
             "simulated: say what the sample is"
         )
-    clock = SimulatedClock(elapsed_s)
-    scene = Scene(loaded.rig, loaded.protocol, sample)
-    operator = SimulatedOperator(scene, clock)
-
-    def begin_step(step: int) -> None:
-        scene.step = step
-
-    return Devices(
-        {name: _axis(name, scene, operator, clock) for name in AXES},
-        SimulatedCamera(scene, clock),
-        _lamp(scene, operator, clock),
-        operator,
-        clock,
-        begin_step,
-    )
-
-
-def _axis(name: str, scene: Scene, operator: Operator, clock: Clock) -> Axis:
-    settings = scene.rig.axes[name]
-    stage: Stage
-    if isinstance(settings, HandAxis):
-        stage = HandSetAxis(name, WORDS[name], operator)
-    else:
-        stage = SimulatedStage(name, settings, scene, clock)
-    return Axis(name, stage, settings, clock)
-
-
-def _lamp(scene: Scene, operator: Operator, clock: Clock) -> Lamp:
-    if scene.rig.lamp.darkened_by == "hand":
-        return HandCoveredLamp(operator)
-    return SimulatedShutter(scene, clock)
+    return Scene(loaded.rig, loaded.protocol, sample)

@@ -19,11 +19,11 @@ from acquisition.console import (
     print_plan,
     progress,
 )
-from acquisition.engine import Engine
+from acquisition.engine import Devices, Engine
 from acquisition.models import check_model
 from acquisition.motion import home_pose, moves_between
 from acquisition.plan import Plan, make_plan
-from acquisition.rig import open_devices
+from acquisition.rig import open_devices, prepare
 from instrument.config import Loaded, load_protocol
 from instrument.errors import DeviceError, InputError, OperatorStop
 from instrument.files import write_whole
@@ -38,6 +38,7 @@ def run_protocol(
     """Plan, scan, fit, report. Raises `InputError` before anything moves, or what the scan met."""
     loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
     plan = make_plan(loaded)
+    prepare(loaded)
     folder = out if out is not None else _default_folder(loaded)
     with Record.create(folder, _meta(loaded, plan)) as record:
         write_whole(folder / PROTOCOL_FILE, loaded.protocol_text)
@@ -56,6 +57,7 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
         missing = [step for step in plan.steps if step.index not in done]
         if missing:
             moves_between(home_pose(loaded.rig), missing[0].pose, loaded.rig)  # or nothing moves
+            prepare(loaded)
             _confirm(yes, len(missing))
             _scan(loaded, plan, record, done)
         _finish(record, loaded, as_json)
@@ -92,6 +94,21 @@ def _scan(loaded: Loaded, plan: Plan, record: Record, done: frozenset[int] = fro
     """Run the plan; whatever ends it early is in the record and in the message."""
     elapsed_s = max((reading.time_s for reading in record.readings()), default=0.0)
     devices = open_devices(loaded, elapsed_s)
+    try:
+        _drive(loaded, plan, record, done, elapsed_s, devices)
+    finally:
+        devices.close()
+
+
+def _drive(
+    loaded: Loaded,
+    plan: Plan,
+    record: Record,
+    done: frozenset[int],
+    elapsed_s: float,
+    devices: Devices,
+) -> None:
+    begun_s = devices.clock.now_s() - elapsed_s
     console.print(
         f"{loaded.protocol.name}: {len(plan.points)} geometries, about "
         f"{duration_text(plan.duration_s)} on the rig ({loaded.rig.name}), into {record.folder}",
@@ -111,7 +128,7 @@ def _scan(loaded: Loaded, plan: Plan, record: Record, done: frozenset[int] = fro
         record.add_event(clock.utc().isoformat(), "fault", str(error))
         raise DeviceError(f"{error}\n{_go_on(record)}") from error
     record.add_event(clock.utc().isoformat(), "finished", f"{len(plan.steps)} steps")
-    record.set_meta("scan_s", f"{clock.now_s():.1f}")
+    record.set_meta("scan_s", f"{clock.now_s() - begun_s:.1f}")
     record.set_meta("finished_utc", clock.utc().isoformat(timespec="seconds"))
 
 

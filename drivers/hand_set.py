@@ -9,10 +9,14 @@ from instrument.errors import DeviceError
 
 
 class HandSetAxis:
-    """A stage whose motor is the operator. Angles are those that the operator reads."""
+    """A stage whose motor is the operator. Angles are those that the operator reads.
 
-    def __init__(self, name: str, words: str, operator: Operator) -> None:
+    `tolerance_deg`: how far from what was asked the operator may set it.
+    """
+
+    def __init__(self, name: str, words: str, operator: Operator, tolerance_deg: float) -> None:
         self._name, self._words, self._operator = name, words, operator
+        self._tolerance_deg = tolerance_deg
         self._angle_deg: float | None = None
 
     def identity(self) -> str:
@@ -23,24 +27,28 @@ class HandSetAxis:
         """Nothing to find: the operator reads the scale."""
 
     def start_move(self, angle_deg: float) -> None:
-        """Ask for the angle and wait for the answer."""
-        request = Request(
-            "set axis",
-            f"Set {self._words} ({self._name}) to {angle_deg:g} degrees",
-            axis=self._name,
-            angle_deg=angle_deg,
-        )
-        self._operator.ask(request)
-        self._angle_deg = angle_deg
+        """Ask for the angle until the operator says that it is set, or stops."""
+        text = f"Set {self._words} ({self._name}) to {angle_deg:g} degrees"
+        while True:
+            request = Request("set axis", text, axis=self._name, angle_deg=angle_deg)
+            answer = self._operator.ask(request)
+            said = _number(answer, angle_deg)
+            if said is not None and abs(said - angle_deg) <= self._tolerance_deg:
+                self._angle_deg = said
+                return
+            text = (
+                f"{answer!r} is not within {self._tolerance_deg:g} degrees of {angle_deg:g}: set "
+                f"{self._words} ({self._name}) to {angle_deg:g} degrees"
+            )
 
     def wait(self) -> float:
-        """The angle that was set, in degrees."""
+        """The angle that the operator said was set, in degrees."""
         if self._angle_deg is None:
             raise DeviceError(f"{self._name} is set by hand and has not been set yet")
         return self._angle_deg
 
     def position_deg(self) -> float:
-        """The angle that was set, in degrees."""
+        """The angle that the operator said was set, in degrees."""
         return self.wait()
 
     def limits_deg(self) -> tuple[float, float]:
@@ -52,6 +60,16 @@ class HandSetAxis:
 
     def close(self) -> None:
         """Nothing to let go of."""
+
+
+def _number(answer: str, otherwise: float) -> float | None:
+    """The angle of an answer; an empty one, or "done", means as asked."""
+    if answer.strip().lower() in ("", "done", "ok", "y", "yes"):
+        return otherwise
+    try:
+        return float(answer.strip().rstrip("°").replace(",", "."))
+    except ValueError:
+        return None
 
 
 class HandCoveredLamp:

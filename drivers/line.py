@@ -85,7 +85,7 @@ class Line:
         """Send bytes."""
         self._guarded(self._serial.write, data)
 
-    def read_line(self, deadline_s: float) -> bytes:
+    def read_line(self, deadline_s: float, who: str) -> bytes:
         """The next line without its end, NUL bytes dropped; `NoReply` past the monotonic deadline.
 
         A controller whose motor supply was cut sends NULs.
@@ -93,17 +93,17 @@ class Line:
         while (end := self._buffer.find(b"\n")) < 0:
             left_s = deadline_s - time.monotonic()
             if left_s <= 0 or len(self._buffer) > MOST_BYTES:
-                raise self._no_line()
+                raise self._no_line(who)
             self._buffer += self._guarded(self._read, left_s)
         line = bytes(self._buffer[:end])
         del self._buffer[: end + 1]
         return line.replace(b"\0", b"").strip(b"\r")
 
-    def exchange(self, request: bytes, pick: Callable[[bytes], T | None]) -> T:
+    def exchange(self, who: str, request: bytes, pick: Callable[[bytes], T | None]) -> T:
         """Send a request and return what `pick` makes of its answer, the first that it takes.
 
         Other lines (an alert, a late answer to another question) are passed over. The caller has
-        the turn.
+        the turn; `who` asks, and is named in errors.
         """
         self.dirty = True
         self.write(request)
@@ -111,10 +111,10 @@ class Line:
         foreign = b""
         while True:
             try:
-                line = self.read_line(deadline_s)
+                line = self.read_line(deadline_s, who)
             except NoReply:
                 if foreign:
-                    raise self._garbled(foreign) from None
+                    raise self._garbled(who, foreign) from None
                 raise
             found = pick(line)
             if found is not None:
@@ -145,17 +145,17 @@ class Line:
         first = bytes(self._serial.read(1))
         return first + bytes(self._serial.read(self._serial.in_waiting)) if first else b""
 
-    def _no_line(self) -> DeviceError:
+    def _no_line(self, who: str) -> DeviceError:
         if self._buffer:
-            return self._garbled(bytes(self._buffer))
+            return self._garbled(who, bytes(self._buffer))
         return NoReply(
-            f"{self.who}: no answer within {self.reply_s:g} s: look at its power and at the cable "
+            f"{who}: no answer within {self.reply_s:g} s: look at its power and at the cable "
             f"of {self.port}"
         )
 
-    def _garbled(self, what: bytes) -> Garbled:
+    def _garbled(self, who: str, what: bytes) -> Garbled:
         return Garbled(
-            f"{self.who}: no answer within {self.reply_s:g} s that makes sense, only "
+            f"{who}: no answer within {self.reply_s:g} s that makes sense, only "
             f"{what[:40]!r}: look at the baud rate and at the cable of {self.port}"
         )
 

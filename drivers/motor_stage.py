@@ -105,8 +105,13 @@ class MotorStage(ABC):
         return max(low, self._limits.min_deg), min(high, self._limits.max_deg)
 
     def position_deg(self) -> float:
-        """Where the stage is."""
-        return self.status().position_deg
+        """Where the stage is. Before homing nobody knows, whatever the controller counts."""
+        now = self.status()
+        if not now.homed and not now.moving:
+            raise DeviceError(
+                f"{self.name}: not homed, so its position is not known: home it first"
+            )
+        return now.position_deg
 
     def home(self) -> None:
         """Find the reference and stand at home; a controller that keeps it only goes there."""

@@ -71,7 +71,7 @@ class NewportPort:
         self._clean()
         request = framing.command(self.address, letters, value)
         text = self.line.exchange(
-            request, lambda line: framing.answer_to(self.address, letters, line)
+            self.who, request, lambda line: framing.answer_to(self.address, letters, line)
         )
         try:
             return read(text)
@@ -88,7 +88,9 @@ class NewportPort:
             self.line.dirty = False
             return
         request = framing.command(self.address, "VE")
-        name = self.line.exchange(request, lambda li: framing.answer_to(self.address, "VE", li))
+        name = self.line.exchange(
+            self.who, request, lambda li: framing.answer_to(self.address, "VE", li)
+        )
         if name != self._version:
             self.line.dirty = True
             raise Garbled(f"{self.who}: calls itself {name!r} now, and {self._version!r} before")

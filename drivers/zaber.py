@@ -45,7 +45,7 @@ class ZaberPort:
             self._next_id = (self._next_id + 1) % _STOP_ID
             number, to = self._next_id, self.axis if axis is None else axis
             request = framing.command(self.device, to, number, text)
-            reply = self.line.exchange(request, lambda line: self._mine(line, to, number))
+            reply = self.line.exchange(self.who, request, lambda line: self._mine(line, to, number))
         if not reply.accepted:
             raise DeviceError(f"{self.who}: refused {text!r}: {reply.data}")
         return reply

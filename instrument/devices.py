@@ -18,11 +18,15 @@ Surface = Literal["sample", "white tile"]
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One picture: `image[row, column]` in counts (DN), its exposure and time of read-out."""
+    """One picture: `image[row, column]` in counts (DN), its exposure and time of read-out.
+
+    `device_time_s`: the camera's own time stamp, in seconds of the monotonic clock; None without.
+    """
 
     image: Image
     exposure_s: float
     time_s: float
+    device_time_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,17 +12,17 @@ import json
 import math
 import os
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal
 
-from instrument.devices import Surface
+from instrument.devices import Frame, Surface
 from instrument.errors import InputError
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 FILE_NAME = "record.sqlite"
 LOCK_NAME = ".scanning"
 
@@ -35,6 +35,8 @@ CREATE TABLE event (id INTEGER PRIMARY KEY, time_utc TEXT NOT NULL, kind TEXT NO
                     text TEXT NOT NULL);
 CREATE TABLE dark (id INTEGER PRIMARY KEY, time_utc TEXT NOT NULL, exposure_s REAL NOT NULL,
                    frames INTEGER NOT NULL, mean_dn REAL NOT NULL, noise_dn REAL NOT NULL);
+CREATE TABLE frame (step INTEGER NOT NULL, number INTEGER NOT NULL, exposure_s REAL NOT NULL,
+                    time_s REAL NOT NULL, device_time_s REAL, PRIMARY KEY (step, number));
 CREATE TABLE preview (step INTEGER PRIMARY KEY, caption TEXT NOT NULL, png BLOB NOT NULL,
                       polygon TEXT NOT NULL);
 """
@@ -198,10 +200,20 @@ class Record:
         with self._db:
             self._db.execute("INSERT INTO dark VALUES (NULL, ?, ?, ?, ?, ?)", row)
 
-    def add_reading(self, reading: Reading, preview: Preview | None = None) -> None:
-        """Accept a measured geometry, with its picture if one is kept, in one transaction."""
+    def add_reading(
+        self, reading: Reading, preview: Preview | None = None, frames: Sequence[Frame] = ()
+    ) -> None:
+        """Accept a measured geometry in one transaction: its picture if one is kept, its frames.
+
+        Of a frame are kept its exposure, when it was read, and the camera's own time stamp.
+        """
         marks = ", ".join("?" * len(fields(Reading)))
+        rows = [
+            (reading.step, number, frame.exposure_s, frame.time_s, frame.device_time_s)
+            for number, frame in enumerate(frames)
+        ]
         with self._db:
+            self._db.executemany("INSERT INTO frame VALUES (?, ?, ?, ?, ?)", rows)
             self._db.execute(f"INSERT INTO reading VALUES ({marks})", astuple(reading))
             if preview is not None:
                 row = (preview.step, preview.caption, preview.png, json.dumps(preview.polygon))

@@ -116,6 +116,11 @@ class Rig(Section):
             yield "lamp", "real" if self.lamp.driver == "manual" else "simulated"
 
     @property
+    def kind(self) -> str:
+        """In a word: simulated, emulated or real."""
+        return "simulated" if self.simulated else "emulated" if self.emulated else "real"
+
+    @property
     def emulated(self) -> bool:
         """Whether real drivers talk to emulated devices."""
         return not self.simulated and getattr(self.camera, "device", "") == EMULATED

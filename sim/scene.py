@@ -44,6 +44,10 @@ class Scene:
     rings: dict[tuple[str, float, float], NDArray[np.int64]] = field(default_factory=dict)
     _texture: FloatArray | None = None
 
+    def begin_step(self, step: int) -> None:
+        """From now on the plan's step `step` is measured: its noise is its own."""
+        self.step = step
+
     def random(self, *key: int) -> np.random.Generator:
         """A stream of random numbers that belongs to `key` alone."""
         return np.random.Generator(np.random.SFC64([self.rig.simulation.seed, *key]))

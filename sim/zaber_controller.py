@@ -14,12 +14,14 @@ _COMMAND = re.compile(r"/(\d+)?(?: (\d+))?(?: (\d\d))?(?: ([a-z].*))?")
 class ZaberController:
     """One device with one axis. `motor.alarm` holds a warning flag that begins with F."""
 
-    def __init__(self, motor: Motor, device: int = 1) -> None:
-        self.motor, self.device = motor, device
+    def __init__(
+        self, motor: Motor, device: int = 1, microsteps_per_deg: float = MICROSTEPS_PER_DEG
+    ) -> None:
+        self.motor, self.device, self._per_deg = motor, device, microsteps_per_deg
         self._buffer = b""
         self.moves = 0
         low, high = motor.mechanics.min_deg, motor.mechanics.max_deg
-        speed = motor.mechanics.speed_deg_per_s * MICROSTEPS_PER_DEG * _SPEED_PER_MICROSTEP
+        speed = motor.mechanics.speed_deg_per_s * self._per_deg * _SPEED_PER_MICROSTEP
         self.settings: dict[str, int | str] = {
             "deviceid": 59999,  # no real device's
             "system.serial": 75001,
@@ -31,8 +33,8 @@ class ZaberController:
             "comm.address": device,
             "resolution": 64,
             "peripheral.id": 0,
-            "limit.min": round(low * MICROSTEPS_PER_DEG),
-            "limit.max": round(high * MICROSTEPS_PER_DEG),
+            "limit.min": round(low * self._per_deg),
+            "limit.max": round(high * self._per_deg),
             "maxspeed": round(speed),
         }
 
@@ -74,7 +76,7 @@ class ZaberController:
 
     def _get(self, setting: str) -> tuple[str, str]:
         if setting in ("pos", "encoder.pos"):
-            return "OK", str(round(self.motor.position_deg * MICROSTEPS_PER_DEG))
+            return "OK", str(round(self.motor.position_deg * self._per_deg))
         if setting not in self.settings:
             return "RJ", "BADCOMMAND"
         return "OK", str(self.settings[setting])
@@ -100,7 +102,7 @@ class ZaberController:
         if not low <= int(value) <= high:
             return "RJ", "BADDATA"
         self.moves += 1
-        self.motor.move(int(value) / MICROSTEPS_PER_DEG)
+        self.motor.move(int(value) / self._per_deg)
         return "OK", "0"
 
     def _home(self, _: str) -> tuple[str, str]:

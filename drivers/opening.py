@@ -1,0 +1,102 @@
+"""Opens the driver that a rig file names; axes on the same port share its line."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Self
+
+from drivers.line import Line
+from drivers.motor_stage import Limits, MotorStage
+from instrument.axis_config import NewportAxis, OrientalAxis, Wired, ZaberAxis
+from instrument.camera_config import V4l2Camera
+from instrument.clock import Clock
+from instrument.devices import Camera
+
+
+class Lines:
+    """The open ports, each once; use it with `with`."""
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock = clock
+        self._serial: dict[str, Line] = {}
+        self._closing = ExitStack()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._closing.close()
+
+    def serial(self, who: str, port: str, baudrate: int) -> Line:
+        """The line of a serial port, opened for whoever asks first."""
+        if port not in self._serial:
+            line = Line(who, port, baudrate)
+            self._closing.callback(line.close)
+            self._serial[port] = line
+        return self._serial[port]
+
+
+def open_stage(name: str, axis: Wired, port: str, lines: Lines) -> MotorStage:
+    """The stage of an axis. Raises `DeviceError` where another device or none answers."""
+    if isinstance(axis, NewportAxis):
+        return _newport(name, axis, port, lines)
+    if isinstance(axis, ZaberAxis):
+        return _zaber(name, axis, port, lines)
+    return _oriental(name, axis, port, lines)
+
+
+def _newport(name: str, axis: NewportAxis, port: str, lines: Lines) -> MotorStage:
+    from drivers.newport import BAUDRATE, NewportStage
+
+    line = lines.serial(name, port, BAUDRATE[axis.model])
+    return NewportStage(name, line, axis.address, axis.model, _limits(axis), lines.clock)
+
+
+def _zaber(name: str, axis: ZaberAxis, port: str, lines: Lines) -> MotorStage:
+    from drivers.zaber import BAUDRATE, ZaberStage
+
+    line = lines.serial(name, port, BAUDRATE)
+    device, number, per_deg = axis.device, axis.axis, axis.microsteps_per_deg
+    return ZaberStage(name, line, device, number, per_deg, _limits(axis), lines.clock)
+
+
+def _oriental(name: str, axis: OrientalAxis, port: str, lines: Lines) -> MotorStage:
+    raise NotImplementedError
+
+
+def _limits(axis: Wired) -> Limits:
+    low, high = axis.device_limits_deg()
+    return Limits(
+        low,
+        high,
+        axis.speed_deg_per_s,
+        axis.acceleration_deg_per_s2,
+        axis.tolerance_deg,
+        axis.homing_s,
+        axis.to_device_deg(axis.home_deg),
+    )
+
+
+def open_camera(camera: V4l2Camera, device: str, clock: Clock) -> Camera:
+    """The camera. Raises `DeviceError` where it cannot do what the rig file asks for."""
+    from drivers import v4l2
+    from drivers.v4l2_settings import V4l2Settings
+
+    settings = V4l2Settings(
+        device,
+        camera.pixel_format,
+        camera.width_px,
+        camera.height_px,
+        camera.bit_depth,
+        camera.min_exposure_s,
+        camera.max_exposure_s,
+        camera.gain,
+        exposure_delay_frames=camera.exposure_delay_frames,
+    )
+    return v4l2.V4l2Camera(settings, clock)
