@@ -36,6 +36,22 @@ def cpu_seconds(action: Callable[[], object], repeats: int) -> float:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="run the long proofs whole")
+    real = parser.getgroup("real devices", "tests marked hil")
+    real.addoption("--allow-motion", action="store_true", help="the rig is clear: stages may move")
+    real.addoption("--stage-port", help="of a real stage: /dev/serial/by-id/..., tcp://host:port")
+    real.addoption("--stage-driver", default="newport", choices=["newport", "oriental", "zaber"])
+    real.addoption("--stage-scale", type=float, default=1000.0, help="steps a degree")
+    real.addoption("--camera", help="of a real camera: /dev/v4l/by-id/...")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Hardware stays untouched unless somebody stands by and has said so."""
+    if config.getoption("--allow-motion"):
+        return
+    refused = pytest.mark.skip(reason="real devices: not without --allow-motion")
+    for item in items:
+        if item.get_closest_marker("hil"):
+            item.add_marker(refused)
 
 
 @pytest.fixture

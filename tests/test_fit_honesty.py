@@ -4,13 +4,14 @@ Fitted with the true model: 95 % intervals hold the truth in 93.5 to 96.5 % of 2
 estimates spread by at most 1.05 times the bound of Cramer and Rao. Through the whole choice: the
 right physics in 95 % of 500 scans once the extra term's part that the simpler model cannot follow,
 lambda = sum((part / u)^2), is 25; the simpler model in 95 % where there is none. `make test` runs
-a few of the scans, with limits as much wider as fewer scans know less; `pytest --slow` all.
+a few of the scans, with limits as much wider as fewer scans know less; `pytest --slow` all. The
+figures are properties in what `--junitxml FILE` writes.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 import pytest
@@ -79,7 +80,7 @@ def cramer_rao(name: str, truth: Mapping[str, float], u_relative: float) -> Floa
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(TRUTHS))
 def test_intervals_hold_the_truth_and_estimates_spread_no_more_than_they_must(
-    name: str, slow: bool
+    name: str, slow: bool, record_property: Callable[[str, object], None]
 ) -> None:
     share = 1.0 if slow else BOUNDED
     truth, count = TRUTHS[name], round(2000 * share)
@@ -88,9 +89,11 @@ def test_intervals_hold_the_truth_and_estimates_spread_no_more_than_they_must(
     for k, parameter in enumerate(truth):
         ends = [interval_95(result, parameter) for result in fits]
         held = np.mean([low <= truth[parameter] <= high for low, high in ends])
+        record_property(f"{name} {parameter}: share of 95 % intervals with the truth", held)
         assert abs(held - 0.95) <= 0.015 * wider, (parameter, held)
         spread = np.std([result.values[parameter] for result in fits])
         bound = cramer_rao(name, truth, 0.01)[k]
+        record_property(f"{name} {parameter}: spread over the bound", spread / bound)
         assert spread <= (1 + 0.05 * wider) * bound, (parameter, spread / bound)
 
 
@@ -111,6 +114,7 @@ def test_the_choice_is_the_right_one_where_the_data_tell_and_the_simpler_one_whe
     right: str,
     truth: dict[str, float],
     slow: bool,
+    record_property: Callable[[str, object], None],
 ) -> None:
     share = 1.0 if slow else BOUNDED
     u, count = noise_for(simpler, right, truth, 25.0), round(500 * share)
@@ -118,4 +122,5 @@ def test_the_choice_is_the_right_one_where_the_data_tell_and_the_simpler_one_whe
     for name, values in ((right, truth), (simpler, plain)):
         chosen = [choose(m).chosen or "" for m in scans(name, values, u, count)]
         found = np.mean([physics(c) == physics(name) for c in chosen])
+        record_property(f"{name} against {simpler}: share chosen", found)
         assert found >= least, (name, found, sorted(set(chosen)))
