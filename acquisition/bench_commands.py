@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.console import console, out
+from acquisition.console import ask, out
 from acquisition.models import check_model
 from acquisition.motion import axis_moves
 from acquisition.rig import Bench, see_emulated_camera
@@ -211,5 +211,8 @@ def _confirm(rig: Rig, yes: bool, what: str) -> None:
         return
     if not sys.stdin.isatty():
         raise InputError(f"{what}\nnobody to ask whether the rig is clear: add --yes")
-    if console.input(f"{what} Is the rig clear? [y/N] ").strip().lower() not in ("y", "yes"):
+    if ask(f"{what} Is the rig clear? [y/N]").lower() not in (
+        "y",
+        "yes",
+    ):
         raise OperatorStop("nothing has moved")

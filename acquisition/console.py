@@ -21,6 +21,12 @@ console = Console(stderr=True, markup=False)
 out = Console(markup=False)
 
 
+def ask(question: str) -> str:
+    """What somebody at the terminal answers, without blanks about it. Raises `EOFError`."""
+    console.print(question, end=" ", highlight=False, soft_wrap=True)
+    return console.input("").strip()
+
+
 def duration_text(seconds: float) -> str:
     """Seconds as an operator would say it."""
     minutes, rest = divmod(round(seconds), 60)

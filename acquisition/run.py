@@ -13,6 +13,7 @@ from pathlib import Path
 
 from acquisition.afterwards import Afterwards
 from acquisition.console import (
+    ask,
     console,
     duration_text,
     print_outcome,
@@ -190,10 +191,10 @@ def as_used(record: Record) -> Loaded:
 
 def _confirm(yes: bool, steps: int) -> None:
     """Nothing moves again until the operator has said so."""
-    question = f"{steps} readings are missing. Is the rig clear, may the stage move? [y/N] "
+    question = f"{steps} readings are missing. Is the rig clear, may the stage move? [y/N]"
     if yes:
         return
     if not sys.stdin.isatty():
         raise InputError("gonio resume: nobody to ask whether the rig may move: add --yes")
-    if console.input(question).strip().lower() not in ("y", "yes"):
+    if ask(question).lower() not in ("y", "yes"):
         raise OperatorStop("not resumed: nothing has moved")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from acquisition.console import console
+from acquisition.console import ask
 from instrument.devices import Request
 from instrument.errors import InputError, OperatorStop
 
@@ -18,12 +18,12 @@ class TerminalOperator:
         """What the operator answers; Enter alone says that it is done. `q` stops the scan."""
         more = "type the angle if it is another, " if request.action == "set axis" else ""
         try:
-            answer = console.input(f"\n{request.text}. Enter when done; {more}q to stop: ")
+            answer = ask(f"\n{request.text}. Enter when done; {more}q to stop:")
         except EOFError:
             raise OperatorStop("standard input ended: nobody answers") from None
-        if answer.strip().lower() in _STOP:
+        if answer.lower() in _STOP:
             raise OperatorStop(f"stopped at the prompt: {request.text}")
-        return answer.strip() or "done"
+        return answer or "done"
 
 
 def require_terminal(what: str) -> None:

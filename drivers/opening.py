@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from drivers.line import Line
 from drivers.motor_stage import Limits, MotorStage
@@ -13,6 +13,10 @@ from instrument.camera_config import V4l2Camera
 from instrument.clock import Clock
 from instrument.devices import Camera
 
+if TYPE_CHECKING:
+    from drivers.modbus_bus import ModbusBus
+    from drivers.modbus_client import BusSettings
+
 
 class Lines:
     """The open ports, each once; use it with `with`."""
@@ -20,6 +24,7 @@ class Lines:
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
         self._serial: dict[str, Line] = {}
+        self._modbus: dict[str, ModbusBus] = {}
         self._closing = ExitStack()
 
     def __enter__(self) -> Self:
@@ -40,6 +45,16 @@ class Lines:
             self._closing.callback(line.close)
             self._serial[port] = line
         return self._serial[port]
+
+    def modbus(self, who: str, settings: BusSettings) -> ModbusBus:
+        """The bus of a Modbus port, opened for whoever asks first."""
+        from drivers.modbus_bus import ModbusBus
+
+        if settings.port not in self._modbus:
+            bus = ModbusBus(who, settings)
+            self._closing.callback(bus.close)
+            self._modbus[settings.port] = bus
+        return self._modbus[settings.port]
 
 
 def open_stage(name: str, axis: Wired, port: str, lines: Lines) -> MotorStage:
@@ -67,7 +82,12 @@ def _zaber(name: str, axis: ZaberAxis, port: str, lines: Lines) -> MotorStage:
 
 
 def _oriental(name: str, axis: OrientalAxis, port: str, lines: Lines) -> MotorStage:
-    raise NotImplementedError
+    from drivers.oriental import OrientalSettings, OrientalStage
+
+    settings = OrientalSettings(
+        port, axis.steps_per_deg, _limits(axis), axis.baudrate, axis.parity, axis.unit
+    )
+    return OrientalStage(name, settings, lines.clock, lines.modbus(name, settings.bus))
 
 
 def _limits(axis: Wired) -> Limits:
@@ -85,8 +105,8 @@ def _limits(axis: Wired) -> Limits:
 
 def open_camera(camera: V4l2Camera, device: str, clock: Clock) -> Camera:
     """The camera. Raises `DeviceError` where it cannot do what the rig file asks for."""
-    from drivers import v4l2
-    from drivers.v4l2_settings import V4l2Settings
+    from drivers.v4l2 import V4l2Camera as Driver
+    from drivers.v4l2 import V4l2Settings
 
     settings = V4l2Settings(
         device,
@@ -98,5 +118,6 @@ def open_camera(camera: V4l2Camera, device: str, clock: Clock) -> Camera:
         camera.max_exposure_s,
         camera.gain,
         exposure_delay_frames=camera.exposure_delay_frames,
+        frames_per_s=camera.frames_per_s,
     )
-    return v4l2.V4l2Camera(settings, clock)
+    return Driver(settings, clock)

@@ -82,6 +82,7 @@ class V4l2Camera(Camera):
 
     `gain` in the camera's own unit; where it is left out the camera must have none or keep its own.
     `exposure_delay_frames`: frames after a change of exposure that may still have the old one.
+    `frames_per_s`: asked of the camera; left out, what it makes of 30 a second.
     """
 
     driver: Literal["v4l2"]
@@ -89,6 +90,7 @@ class V4l2Camera(Camera):
     pixel_format: Literal["GREY", "Y10", "Y16", "YUYV"]
     gain: int | None = None
     exposure_delay_frames: Annotated[int, Field(ge=0, le=20)] = 2
+    frames_per_s: Annotated[int, Field(ge=1, le=1000)] | None = None
 
     @property
     def exposure_step_s(self) -> float:

@@ -171,8 +171,9 @@ class TcpWire(_Wire):
         while not self._closing.is_set():
             try:
                 self._peer, _ = self._listener.accept()
-                while data := self._peer.recv(4096):
-                    self._arrived(data)
+                with self._peer as peer:  # one that hangs up is closed before the next
+                    while data := peer.recv(4096):
+                        self._arrived(data)
             except OSError:
                 continue  # unplugged, or the master has gone
 

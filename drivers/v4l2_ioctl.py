@@ -1,0 +1,284 @@
+"""Video4Linux2 requests: numbers, structures as bytes, and the calls that need no stream.
+
+Layouts are those of linux/videodev2.h on a 64-bit machine; only single-plane capture is known.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from struct import Struct
+from typing import TypeVar
+
+CAPTURE = 1  # V4L2_BUF_TYPE_VIDEO_CAPTURE
+MMAP = 1  # V4L2_MEMORY_MMAP
+
+_WRITE, _READ = 1, 2
+
+
+def _request(direction: int, number: int, size: int) -> int:
+    return (direction << 30) | (size << 16) | (ord("V") << 8) | number
+
+
+QUERYCAP = _request(_READ, 0, 104)
+ENUM_FMT = _request(_READ | _WRITE, 2, 64)
+G_FMT = _request(_READ | _WRITE, 4, 208)
+S_FMT = _request(_READ | _WRITE, 5, 208)
+REQBUFS = _request(_READ | _WRITE, 8, 20)
+QUERYBUF = _request(_READ | _WRITE, 9, 88)
+QBUF = _request(_READ | _WRITE, 15, 88)
+DQBUF = _request(_READ | _WRITE, 17, 88)
+STREAMON = _request(_WRITE, 18, 4)
+STREAMOFF = _request(_WRITE, 19, 4)
+G_PARM = _request(_READ | _WRITE, 21, 204)
+S_PARM = _request(_READ | _WRITE, 22, 204)
+ENUMINPUT = _request(_READ | _WRITE, 26, 80)
+G_CTRL = _request(_READ | _WRITE, 27, 8)
+S_CTRL = _request(_READ | _WRITE, 28, 8)
+QUERYCTRL = _request(_READ | _WRITE, 36, 68)
+G_INPUT = _request(_READ, 38, 4)
+S_INPUT = _request(_READ | _WRITE, 39, 4)
+TRY_FMT = _request(_READ | _WRITE, 64, 208)
+ENUM_FRAMESIZES = _request(_READ | _WRITE, 74, 44)
+
+CAPABILITY_STRUCT = Struct("<16s32s32sIII12x")  # driver, card, bus, version, capabilities, device's
+FMTDESC_STRUCT = Struct("<III32sI16x")  # index, type, flags, description, fourcc
+# type, width, height, fourcc, field, bytes per line, size of the image, colour space
+FORMAT_STRUCT = Struct("<I4xIIIIIII172x")
+REQBUFS_STRUCT = Struct("<IIII4x")  # count, type, memory, capabilities
+# index, type, bytes used, flags, field, s, us, sequence, memory, offset, length
+BUFFER_STRUCT = Struct("<5I4xqq16xIIQI12x")
+PARM_STRUCT = Struct("<IIIII184x")  # type, capability, mode, seconds per frame as a fraction
+CONTROL_STRUCT = Struct("<Ii")  # id, value
+# id, kind, name, least, greatest, step, default, flags
+QUERYCTRL_STRUCT = Struct("<II32siiiiI8x")
+# index, fourcc, kind, then width, height; or least, greatest, step of width and of height
+FRAMESIZE_STRUCT = Struct("<IIIIIIIII8x")
+
+BUFFER_QUEUED, BUFFER_DONE, BUFFER_ERROR = 0x2, 0x4, 0x40
+DISCRETE = 1  # V4L2_FRMSIZE_TYPE_DISCRETE
+
+AUTO_WHITE_BALANCE = 0x98090C
+GAMMA = 0x980910
+AUTOGAIN = 0x980912
+GAIN = 0x980913
+EXPOSURE_AUTO = 0x9A0901
+EXPOSURE_ABSOLUTE = 0x9A0902
+
+KINDS = {
+    1: "integer",
+    2: "on/off",
+    3: "menu",
+    4: "button",
+    5: "integer64",
+    6: "class",
+    7: "string",
+    8: "bitmask",
+    9: "menu",
+}
+_NEXT, _DISABLED, _WITHOUT_VALUE = 0x80000000, 0x1, (4, 5, 6, 7)
+_MOST_ANSWERS = 256  # a driver that never refuses a number must not hold us for ever
+
+
+def fourcc(name: str) -> int:
+    """The number of a pixel format's name of up to four letters, "Y16" as "GREY"."""
+    return int.from_bytes(name.ljust(4).encode("ascii"), "little")
+
+
+def fourcc_name(number: int) -> str:
+    """The name of a pixel format's number, without padding."""
+    return number.to_bytes(4, "little").decode("ascii", "replace").rstrip()
+
+
+def text(raw: bytes) -> str:
+    """A zero-terminated text of a structure."""
+    return raw.split(b"\0", 1)[0].decode("utf-8", "replace")
+
+
+@dataclass(frozen=True, slots=True)
+class Capability:
+    """Who a device says it is."""
+
+    driver: str
+    card: str
+    bus: str
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """The picture that a device is set to."""
+
+    name: str
+    width_px: int
+    height_px: int
+    bytes_per_line: int
+    bytes_total: int
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """A control: its range and what it stands at; `value` is None where it cannot be read."""
+
+    number: int
+    name: str
+    kind: str
+    least: int
+    greatest: int
+    step: int
+    default: int
+    value: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Buffer:
+    """The state of one buffer of a stream; the time stamp is the device's own, in seconds."""
+
+    index: int
+    bytes_used: int
+    flags: int
+    time_s: float
+    sequence: int
+
+
+@contextmanager
+def opened(device: str) -> Iterator[int]:
+    """A descriptor of its own on `device`: for questions and controls, never for streaming."""
+    descriptor = os.open(device, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+def _call(descriptor: int, request: int, argument: bytes) -> bytes:
+    """One request; raises OSError as the system does."""
+    memory = bytearray(argument)
+    fcntl.ioctl(descriptor, request, memory)
+    return bytes(memory)
+
+
+def capability(descriptor: int) -> Capability:
+    """Who answers on this descriptor."""
+    answer = _call(descriptor, QUERYCAP, bytes(CAPABILITY_STRUCT.size))
+    driver, card, bus, *_ = CAPABILITY_STRUCT.unpack(answer)
+    return Capability(text(driver), text(card), text(bus))
+
+
+def current_format(descriptor: int) -> Format:
+    """The picture that the device is set to."""
+    asked = FORMAT_STRUCT.pack(CAPTURE, *[0] * 7)
+    answer = FORMAT_STRUCT.unpack(_call(descriptor, G_FMT, asked))
+    _, width, height, number, _, per_line, total, _ = answer
+    return Format(fourcc_name(number), width, height, per_line, total)
+
+
+def frame_period_s(descriptor: int) -> float | None:
+    """The frame period that the device says it has; None where it says nothing."""
+    try:
+        answer = _call(descriptor, G_PARM, PARM_STRUCT.pack(CAPTURE, 0, 0, 0, 0))
+    except OSError:
+        return None
+    numerator, denominator = PARM_STRUCT.unpack(answer)[3:]
+    return numerator / denominator if numerator and denominator else None
+
+
+def buffer_state(descriptor: int, index: int) -> Buffer:
+    """The state of one buffer, on the descriptor that streams."""
+    asked = BUFFER_STRUCT.pack(index, CAPTURE, 0, 0, 0, 0, 0, 0, MMAP, 0, 0)
+    answer = BUFFER_STRUCT.unpack(_call(descriptor, QUERYBUF, asked))
+    number, _, used, flags, _, seconds, microseconds, sequence, *_ = answer
+    return Buffer(number, used, flags, seconds + microseconds * 1e-6, sequence)
+
+
+def control_value(descriptor: int, number: int) -> int:
+    """What a control stands at."""
+    answer = _call(descriptor, G_CTRL, CONTROL_STRUCT.pack(number, 0))
+    value: int = CONTROL_STRUCT.unpack(answer)[1]
+    return value
+
+
+def set_control(descriptor: int, number: int, value: int) -> None:
+    """Set a control; the device may clamp the value without a word: read it back."""
+    _call(descriptor, S_CTRL, CONTROL_STRUCT.pack(number, value))
+
+
+def control(descriptor: int, number: int) -> Control | None:
+    """One control's range and value; None where the device has no such control."""
+    try:
+        answer = _call(descriptor, QUERYCTRL, QUERYCTRL_STRUCT.pack(number, 0, b"", *[0] * 5))
+    except OSError:
+        return None
+    found, kind, name, least, greatest, step, default, flags = QUERYCTRL_STRUCT.unpack(answer)
+    if flags & _DISABLED:
+        return None
+    value = None if kind in _WITHOUT_VALUE else _value_or_none(descriptor, found)
+    label = KINDS.get(kind, str(kind))
+    return Control(found, text(name), label, least, greatest, step, default, value)
+
+
+def _value_or_none(descriptor: int, number: int) -> int | None:
+    try:
+        return control_value(descriptor, number)
+    except OSError:
+        return None  # a control that can only be written
+
+
+def controls(descriptor: int) -> list[Control]:
+    """All controls but the headings of their classes."""
+    found: list[Control] = []
+    number = 0
+    while True:
+        asked = QUERYCTRL_STRUCT.pack(number | _NEXT, 0, b"", *[0] * 5)
+        try:
+            answer = _call(descriptor, QUERYCTRL, asked)
+        except OSError:
+            return found
+        number = QUERYCTRL_STRUCT.unpack(answer)[0]
+        one = control(descriptor, number)
+        if one is not None and one.kind != "class":
+            found.append(one)
+
+
+Found = TypeVar("Found")
+
+
+def _numbered(ask: Callable[[int], Found]) -> Iterator[Found]:
+    """What the device answers for 0, 1, 2 … until it refuses a number."""
+    for number in range(_MOST_ANSWERS):
+        try:
+            answer = ask(number)
+        except OSError:
+            return
+        yield answer
+
+
+def formats(descriptor: int) -> list[str]:
+    """Names of the pixel formats that the device offers."""
+
+    def ask(index: int) -> str:
+        asked = FMTDESC_STRUCT.pack(index, CAPTURE, 0, b"", 0)
+        return fourcc_name(FMTDESC_STRUCT.unpack(_call(descriptor, ENUM_FMT, asked))[4])
+
+    return list(_numbered(ask))
+
+
+def sizes(descriptor: int, pixel_format: str) -> list[str]:
+    """Sizes in pixels that go with a format: "640 x 480", or from the least to the greatest."""
+    found = []
+    for kind, *numbers in _numbered(lambda n: _size(descriptor, pixel_format, n)):
+        if kind == DISCRETE:
+            found.append(f"{numbers[0]} x {numbers[1]}")
+            continue
+        least_x, greatest_x, step_x, least_y, greatest_y, step_y = numbers
+        span = f"{least_x} x {least_y} to {greatest_x} x {greatest_y}"
+        return [f"{span} in steps of {step_x} x {step_y}"]
+    return found
+
+
+def _size(descriptor: int, pixel_format: str, index: int) -> tuple[int, ...]:
+    asked = FRAMESIZE_STRUCT.pack(index, fourcc(pixel_format), *[0] * 7)
+    answer = FRAMESIZE_STRUCT.unpack(_call(descriptor, ENUM_FRAMESIZES, asked))
+    return answer[2:]

@@ -1,0 +1,82 @@
+"""What a V4L2 camera is to be set to, and how exposures are counted: in steps of 100 µs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from instrument.errors import DeviceError
+
+PixelFormat = Literal["GREY", "Y10", "Y16", "YUYV"]
+STEPS_PER_S = 10_000  # V4L2_CID_EXPOSURE_ABSOLUTE counts 100 µs
+
+_DEPTHS = {"GREY": (8, 8), "YUYV": (8, 8), "Y10": (10, 10), "Y16": (9, 16)}
+_BUFFERS = (2, 10)  # one is read while another fills; OpenCV has room for ten
+
+
+@dataclass(frozen=True, slots=True)
+class V4l2Settings:
+    """A camera by its device path, best one of /dev/v4l/by-id, and all that it is set to.
+
+    `gain` None leaves the gain alone (an automatic gain is switched off all the same);
+    `frames_per_s` None leaves the rate at what the camera makes of OpenCV's 30 a second.
+    `exposure_delay_frames`: how many frames late a new exposure may reach the sensor.
+    """
+
+    device: str
+    pixel_format: PixelFormat
+    width_px: int
+    height_px: int
+    bit_depth: int
+    min_exposure_s: float
+    max_exposure_s: float
+    gain: int | None = None
+    buffers: int = 4
+    exposure_delay_frames: int = 2
+    frames_per_s: int | None = None
+
+    def __post_init__(self) -> None:
+        self._require("bit_depth", self.bit_depth, *_DEPTHS[self.pixel_format])
+        self._require("buffers", self.buffers, *_BUFFERS)
+        self.exposure_steps(self.min_exposure_s)
+        self.exposure_steps(self.max_exposure_s)
+
+    def _require(self, name: str, value: int, low: int, high: int) -> None:
+        if not low <= value <= high:
+            allowed = f"{low}" if low == high else f"{low} to {high}"
+            raise DeviceError(
+                f"camera {self.device}: {name} {value} with {self.pixel_format}; allowed: {allowed}"
+            )
+
+    @property
+    def bytes_per_line(self) -> int:
+        """Bytes of one row of pixels."""
+        return self.width_px * (1 if self.pixel_format == "GREY" else 2)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the array that OpenCV hands out."""
+        size = (self.height_px, self.width_px)
+        return (*size, 2) if self.pixel_format == "YUYV" else size
+
+    @property
+    def checked_max_dn(self) -> int | None:
+        """The greatest count that a pixel can have, where the sample has room for more."""
+        room = 8 if self.pixel_format in ("GREY", "YUYV") else 16
+        return 2**self.bit_depth - 1 if self.bit_depth < room else None
+
+    def exposure_steps(self, exposure_s: float) -> int:
+        """An exposure in steps of 100 µs; refused outside the range and between two steps."""
+        low, high = self.min_exposure_s, self.max_exposure_s
+        if not low <= exposure_s <= high:
+            raise DeviceError(
+                f"camera {self.device}: exposure {exposure_s:g} s asked for; "
+                f"allowed: {low:g} to {high:g} s"
+            )
+        steps = round(exposure_s * STEPS_PER_S)
+        if steps < 1 or abs(exposure_s * STEPS_PER_S - steps) > 1e-6 * steps:
+            raise DeviceError(
+                f"camera {self.device}: exposure {exposure_s:.10g} s asked for; allowed: "
+                f"multiples of 0.0001 s, the nearest is {max(steps, 1) / STEPS_PER_S:g} s"
+            )
+        return steps
