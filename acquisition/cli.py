@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import math
 import os
 import signal
 import sys
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +17,8 @@ from instrument.errors import GonioError, OperatorStop
 
 # The program's arrays are small: threads of the linear algebra would only wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+STOPPING_S = 2.0  # that stopping all devices may take
 
 app = typer.Typer(
     help="Measure how a flat sample reflects light, and find the simplest model that explains it.",
@@ -160,15 +164,25 @@ def grab(
 
 def main() -> None:
     """Entry point of the `gonio` command."""
-    signal.signal(signal.SIGTERM, _as_interrupt)
+    stop_on_signals()
     try:
         app()
     except KeyboardInterrupt:
         sys.exit(OperatorStop.exit_code)
 
 
-def _as_interrupt(number: int, frame: object) -> None:  # noqa: ARG001 - a signal handler's form
-    raise KeyboardInterrupt
+def stop_on_signals() -> None:
+    """Let Ctrl-C and SIGTERM end what runs; a second one soon after must not cut the stop short."""
+    last_s = -math.inf
+
+    def interrupt(number: int, frame: object) -> None:  # noqa: ARG001 - a signal handler's form
+        nonlocal last_s
+        soon, last_s = time.monotonic() - last_s < STOPPING_S, time.monotonic()
+        if not soon:
+            raise KeyboardInterrupt
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, interrupt)
 
 
 def _do(command: str, *arguments: object, module: str = "acquisition.run") -> None:

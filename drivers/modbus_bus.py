@@ -78,10 +78,7 @@ class ModbusBus:
     def close(self) -> None:
         """Let go of the port; safe twice."""
         self._closed = True
-        try:
-            self._client.close()
-        except (OSError, termios.error):
-            return  # it is gone already: nothing is left to let go of
+        self._let_go()
 
     def open(self, who: str) -> None:
         """Have the port open; a gateway that has hung up is called again.
@@ -127,6 +124,12 @@ class ModbusBus:
         except termios.error as error:
             raise self._lost(who, str(error)) from error
 
+    def _let_go(self) -> None:
+        try:
+            self._client.close()
+        except (OSError, termios.error):
+            return  # it is gone already: nothing is left to let go of
+
     def _no_answer(self, who: str) -> DeviceError:
         heard, within_s = self._client.heard, self.settings.reply_s
         if heard:
@@ -141,10 +144,7 @@ class ModbusBus:
 
     def _lost(self, who: str, why: str) -> PortGone:
         self._gone = self._gone or why
-        try:
-            self._client.close()
-        except (OSError, termios.error):
-            self._client.socket = None  # what cannot be closed is gone
+        self._let_go()
         return PortGone(
             f"{who}: {self.port} is gone ({why}): look at its plug and its power, then go on"
         )

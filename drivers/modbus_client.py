@@ -53,6 +53,12 @@ class SerialClient(ModbusSerialClient):
             )  # fmt: skip
         return True
 
+    def close(self) -> None:
+        """Let go of it; safe twice."""
+        port, self.socket = self.socket, None
+        if port is not None:
+            port.close()
+
     def recv(self, _size: int | None) -> bytes:
         """What comes before the deadline, of whatever size."""
         data = self.listen(self.deadline_s - time.monotonic())
@@ -80,6 +86,12 @@ class TcpClient(ModbusTcpClient):
             self.socket = socket.create_connection((how.host, how.port), how.timeout_connect)
             self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return True
+
+    def close(self) -> None:
+        """Let go of it; safe twice."""
+        port, self.socket = self.socket, None
+        if port is not None:
+            port.close()
 
     def recv(self, _size: int | None) -> bytes:
         """What comes before the deadline, of whatever size."""

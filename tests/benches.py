@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 
 from drivers.line import Line
 from drivers.motor_stage import Limits
 from drivers.newport import NewportStage
+from drivers.oriental import OrientalSettings, OrientalStage
 from drivers.zaber import ZaberStage
 from instrument.clock import SystemClock
 from instrument.devices import Stage
+from sim.modbus_tcp import ModbusTcpGateway
 from sim.motor import Mechanics, Motor
 from sim.newport_controller import NewportController
-from sim.wire import PtyWire
+from sim.oriental_controller import OrientalController
+from sim.wire import PtyWire, TcpWire
 from sim.zaber_controller import MICROSTEPS_PER_DEG, ZaberController
 
 # Quick mechanics: tests wait for real motion. The controller's limits are wider on one side.
@@ -34,14 +38,19 @@ SLOW = Mechanics(
 
 @dataclass
 class Bench:
-    """A stage under test and what is behind it. `alarm` is a fault in its controller's own code."""
+    """A stage under test and what is behind it.
+
+    `alarm`: a fault in its controller's own code; `stop`: the bytes of a stop.
+    """
 
     stage: Stage
     motor: Motor
-    wire: PtyWire
+    wire: PtyWire | TcpWire
     alarm: str
+    stop: bytes
     moves: Callable[[], int]
     reopen: Callable[[], Stage] = field(repr=False)
+    max_deg: float = 80.0  # the narrower of the controller's limit and the rig file's
 
 
 @contextmanager
@@ -57,7 +66,7 @@ def newport(mechanics: Mechanics = MECHANICS) -> Iterator[Bench]:
 
     with PtyWire([controller]) as wire:
         stage = open_stage()
-        yield Bench(stage, motor, wire, "0020", lambda: controller.moves, open_stage)
+        yield Bench(stage, motor, wire, "0020", b"1ST", lambda: controller.moves, open_stage)
         stage.close()
 
 
@@ -75,7 +84,26 @@ def zaber(mechanics: Mechanics = MECHANICS) -> Iterator[Bench]:
 
     with PtyWire([controller]) as wire:
         stage = open_stage()
-        yield Bench(stage, motor, wire, "FS", lambda: controller.moves, open_stage)
+        yield Bench(stage, motor, wire, "FS", b" stop:", lambda: controller.moves, open_stage)
+        stage.close()
+
+
+@contextmanager
+def oriental(kind: type[PtyWire | TcpWire], mechanics: Mechanics = MECHANICS) -> Iterator[Bench]:
+    """An AZ drive on a pseudo-terminal, or behind a gateway."""
+    clock = SystemClock()
+    motor = Motor(mechanics, clock)
+    drive = OrientalController(motor, steps_per_deg=STEPS_PER_DEG)
+
+    def open_stage() -> OrientalStage:
+        port = f"tcp://{wire.host}:{wire.port}" if isinstance(wire, TcpWire) else wire.port
+        settings = OrientalSettings(port, STEPS_PER_DEG, _limits(mechanics), parity="N")
+        return OrientalStage("theta_r", settings, clock)
+
+    with kind([drive if kind is PtyWire else ModbusTcpGateway([drive])]) as wire:
+        stage = open_stage()
+        stop = bytes.fromhex("06007D0020")
+        yield Bench(stage, motor, wire, "30", stop, lambda: drive.triggers, open_stage, 90.0)
         stage.close()
 
 
@@ -90,4 +118,10 @@ def _limits(mechanics: Mechanics) -> Limits:
     )
 
 
-BENCHES = {"newport": newport, "zaber": zaber}
+STEPS_PER_DEG = 1000.0
+BENCHES = {
+    "newport": newport,
+    "zaber": zaber,
+    "oriental rtu": partial(oriental, PtyWire),
+    "oriental tcp": partial(oriental, TcpWire),
+}

@@ -95,7 +95,7 @@ def test_a_line_that_stays_bad_is_named_in_time(bench: Bench, action: str, fault
     with pytest.raises(error, match="theta_r") as failed:
         act(bench)
     assert time.monotonic() - begun_s < BOUND_S
-    assert bench.wire.port in str(failed.value)
+    assert str(bench.wire.port) in str(failed.value)
     assert "look at" in str(failed.value)
     assert bench.moves() - moves <= 1
 

@@ -55,13 +55,13 @@ def test_nothing_moves_before_homing(bench: Bench) -> None:
     assert bench.moves() == 0
 
 
-@pytest.mark.parametrize("angle_deg", [80.001, 90.0, 1e6, -90.001, float("nan"), float("inf")])
-def test_past_the_narrower_limit_not_a_byte_is_sent(bench: Bench, angle_deg: float) -> None:
+def test_past_the_narrower_limit_not_a_byte_is_sent(bench: Bench) -> None:
     bench.stage.home()
-    assert bench.stage.limits_deg() == pytest.approx((-90.0, 80.0), abs=1e-3)
+    assert bench.stage.limits_deg() == pytest.approx((-90.0, bench.max_deg), abs=1e-3)
     sent = len(bench.wire.seen)
-    with pytest.raises(DeviceError, match=r"theta_r: .* deg asked for; its limits are -90 to"):
-        bench.stage.start_move(angle_deg)
+    for angle_deg in (bench.max_deg + 0.001, 1e6, -90.001, float("nan"), float("inf")):
+        with pytest.raises(DeviceError, match=r"theta_r: .* deg asked for; its limits are -90 to"):
+            bench.stage.start_move(angle_deg)
     assert len(bench.wire.seen) == sent
 
 
@@ -198,7 +198,7 @@ def test_a_wrong_device_is_refused_with_what_it_said(words: bytes, says: str) ->
         with pytest.raises(DeviceError) as refused:
             NewportStage("theta_r", line, 1, "SMC100", LIMITS, SystemClock())
         assert says in str(refused.value)
-        assert wire.port in str(refused.value)
+        assert str(wire.port) in str(refused.value)
 
 
 def test_a_port_that_is_not_there_says_what_to_look_at(tmp_path: Path) -> None:
