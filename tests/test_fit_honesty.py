@@ -89,11 +89,11 @@ def test_intervals_hold_the_truth_and_estimates_spread_no_more_than_they_must(
     for k, parameter in enumerate(truth):
         ends = [interval_95(result, parameter) for result in fits]
         held = np.mean([low <= truth[parameter] <= high for low, high in ends])
-        record_property(f"{name} {parameter}: share of 95 % intervals with the truth", held)
+        record_property(f"{name} {parameter}: share of 95 % intervals with the truth", float(held))
         assert abs(held - 0.95) <= 0.015 * wider, (parameter, held)
         spread = np.std([result.values[parameter] for result in fits])
         bound = cramer_rao(name, truth, 0.01)[k]
-        record_property(f"{name} {parameter}: spread over the bound", spread / bound)
+        record_property(f"{name} {parameter}: spread over the bound", float(spread / bound))
         assert spread <= (1 + 0.05 * wider) * bound, (parameter, spread / bound)
 
 
@@ -122,5 +122,5 @@ def test_the_choice_is_the_right_one_where_the_data_tell_and_the_simpler_one_whe
     for name, values in ((right, truth), (simpler, plain)):
         chosen = [choose(m).chosen or "" for m in scans(name, values, u, count)]
         found = np.mean([physics(c) == physics(name) for c in chosen])
-        record_property(f"{name} against {simpler}: share chosen", found)
+        record_property(f"{name} against {simpler}: share chosen", float(found))
         assert found >= least, (name, found, sorted(set(chosen)))
