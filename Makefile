@@ -10,7 +10,8 @@ demo: $(VENV)/.installed
 	$(BIN)/gonio run configs/protocols/demo.yaml
 
 test: $(VENV)/.installed-dev lint
-	$(BIN)/pytest -n auto -m "not hil"
+	$(BIN)/pytest -n auto -m "not hil and not waits"
+	$(BIN)/pytest -n 6 -m "waits and not hil"
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

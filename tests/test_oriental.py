@@ -24,6 +24,8 @@ from sim.motor import Motor
 from sim.oriental_controller import OrientalController, crc
 from sim.wire import Fault, PtyWire, TcpWire
 
+pytestmark = pytest.mark.waits
+
 STOP_TCP, STOP_RTU = bytes.fromhex("06 007D 0020"), bytes.fromhex("01 06 007D 0020")
 MOVE_WRITE = bytes.fromhex("10 0058 0010 20")
 

@@ -20,6 +20,8 @@ from drivers.oriental_framing import value_of
 from instrument.errors import DeviceError
 from sim.wire import Fault
 
+pytestmark = pytest.mark.waits
+
 REPLY_S = 0.05
 FAULTS = {
     "drop": Fault("drop"),

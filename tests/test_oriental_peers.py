@@ -42,6 +42,8 @@ from sim.motor import Motor
 from sim.oriental_controller import OrientalController
 from sim.wire import PtyWire, TcpWire
 
+pytestmark = pytest.mark.waits
+
 TARGET_STEPS = -1234
 
 

@@ -22,6 +22,8 @@ from sim.clock import SimulatedClock
 from sim.scene import Scene
 from sim.stage import SimulatedStage
 
+pytestmark = pytest.mark.waits
+
 TOLERANCE_DEG = 0.05  # of a real stage
 KEYS = {
     "min_deg": -10.0, "max_deg": 10.0, "u_deg": 0.01, "speed_deg_per_s": 5.0,

@@ -16,6 +16,8 @@ from drivers.line import Garbled, NoReply, PortGone
 from instrument.errors import DeviceError
 from sim.wire import Fault
 
+pytestmark = pytest.mark.waits
+
 BOUND_S = 3.0
 
 # One answer spoilt, then all is well: the stage must get over it, whatever it was doing.

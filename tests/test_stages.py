@@ -22,6 +22,8 @@ from instrument.clock import SystemClock
 from instrument.errors import DeviceError
 from sim.wire import PtyWire
 
+pytestmark = pytest.mark.waits
+
 DEADLINE_S = 5.0
 
 
