@@ -33,9 +33,18 @@ def gonio(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The demo's with half of the view angles."""
+    text = (CONFIGS / "protocols" / "demo.yaml").read_text().replace("num: 33", "num: 17")
+    path = tmp_path_factory.mktemp("protocol") / "foam.yaml"
+    path.write_text(text.replace("../rigs/", f"{CONFIGS / 'rigs'}/"))
+    return path
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory, protocol: Path) -> Path:
     folder = tmp_path_factory.mktemp("emulated") / "run"
-    done = gonio("run", CONFIGS / "protocols" / "demo.yaml", "--rig", RIG, "--out", folder)
+    done = gonio("run", protocol, "--rig", RIG, "--out", folder)
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -48,12 +57,11 @@ def test_the_truth_comes_back_within_its_uncertainty(run: Path) -> None:
         assert abs(found[name]["value"] - true) < 4 * found[name]["u"], name
 
 
-def test_each_point_agrees_with_the_simulation(run: Path, tmp_path: Path) -> None:
+def test_each_point_agrees_with_the_simulation(run: Path, tmp_path: Path, protocol: Path) -> None:
     """The same optics and lamp, simulated: what differs is noise, drift and the angles' errors."""
     plain = tmp_path / "plain.yaml"
     plain.write_text(simulated(RIG.read_text()))
-    done = gonio("run", CONFIGS / "protocols" / "demo.yaml", "--rig", plain, "--out",
-                 tmp_path / "run")  # fmt: skip
+    done = gonio("run", protocol, "--rig", plain, "--out", tmp_path / "run")  # fmt: skip
     assert done.returncode == 0, done.stderr
     ours, theirs = points(run), points(tmp_path / "run")
     assert ours.keys() == theirs.keys()
@@ -102,22 +110,21 @@ def test_the_record_says_who_answered_and_when_each_frame_was_taken(run: Path) -
     assert all(0 <= read - stamp < 0.5 for _, read, stamp in frames)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_stopped_scan_goes_on_where_it_was(tmp_path: Path, number: int) -> None:
+def test_a_stopped_scan_goes_on_where_it_was(tmp_path: Path, protocol: Path) -> None:
     folder = tmp_path / "run"
-    command = [sys.executable, "-m", "acquisition", "run", "configs/protocols/demo.yaml",
+    command = [sys.executable, "-m", "acquisition", "run", str(protocol),
                "--rig", str(RIG), "--out", str(folder)]  # fmt: skip
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL,
                           stdout=subprocess.DEVNULL, text=True) as scanning:  # fmt: skip
         wait_for_readings(folder, 5)
-        scanning.send_signal(number)
+        scanning.send_signal(signal.SIGINT)
         _, said = scanning.communicate(timeout=60)
     assert scanning.returncode == 4
     assert f"gonio resume {folder}" in said
     done = gonio("resume", folder, "--yes", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["verdict"] == "adequate"
-    assert len(points(folder)) == 96
+    assert len(points(folder)) == 49  # in two, camera and lamp hide one another
 
 
 def wait_for_readings(folder: Path, count: int) -> None:
@@ -148,11 +155,10 @@ def test_a_frame_of_the_emulated_camera(tmp_path: Path) -> None:
     assert json.loads(done.stdout)["window_mean_dn"] > 200
 
 
-def test_home_and_move_on_emulated_controllers() -> None:
-    for axis in ("theta_i", "dphi", "theta_r"):
-        done = gonio("move", axis, "30", "--rig", RIG)
-        assert done.returncode == 0, done.stderr
-        assert float(done.stdout.split()[-2]) == pytest.approx(30.0, abs=0.01)
+def test_an_emulated_axis_is_homed_and_moved() -> None:
+    done = gonio("move", "dphi", "30", "--rig", RIG)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout.split()[-2]) == pytest.approx(30.0, abs=0.01)
 
 
 def test_without_a_compiler_the_emulated_rig_says_so(tmp_path: Path) -> None:
