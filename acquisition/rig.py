@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import replace
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from acquisition.axis import Axis
 from acquisition.engine import Devices
@@ -13,6 +12,7 @@ from drivers.hand_set import HandCoveredLamp, HandSetAxis
 from instrument.axis_config import AXES, HandAxis, SimulatedAxis, Wired
 from instrument.camera_config import V4l2Camera
 from instrument.clock import Clock, SystemClock
+from instrument.closing import Closing
 from instrument.config import Loaded
 from instrument.devices import Camera, Lamp, Operator, Stage
 from instrument.errors import InputError
@@ -65,7 +65,7 @@ def open_devices(loaded: Loaded, elapsed_s: float = 0.0) -> Devices:
         return replace(devices, close=opening.pop_all().close)
 
 
-class Bench:
+class Bench(Closing):
     """What a rig file describes; each device is opened when it is asked for. Use it with `with`."""
 
     def __init__(self, loaded: Loaded, elapsed_s: float = 0.0) -> None:
@@ -79,15 +79,8 @@ class Bench:
         self._lines = self._closing.enter_context(Lines(self.clock))
         self._emulated = self._emulate(elapsed_s) if self._rig.emulated else None
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Let go of all of it; safe twice."""
         self._closing.close()
 
     def axis(self, name: str) -> Axis:

@@ -9,10 +9,10 @@ from __future__ import annotations
 import termios
 import time
 from collections.abc import Callable
-from types import TracebackType
 from typing import TypeVar
 
 from drivers.turns import Turns
+from instrument.closing import Closing
 from instrument.errors import DeviceError
 
 REPLY_S = 0.25  # controllers answer within 10 to 50 ms; a stop waits no longer than this
@@ -34,7 +34,7 @@ class Garbled(DeviceError):
     """What came is no answer to what was asked."""
 
 
-class Line:
+class Line(Closing):
     """An open serial port. `who` names the device behind it in messages."""
 
     def __init__(
@@ -62,17 +62,6 @@ class Line:
                 f"{who}: cannot open {port}: {error}: look at the cable, at who else has the port "
                 "open, and whether you are in the group that may use it (dialout)"
             ) from error
-
-    def __enter__(self) -> Line:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Let go of the port; safe twice."""

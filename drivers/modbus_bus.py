@@ -14,14 +14,14 @@ import termios
 import time
 from collections.abc import Callable, Sequence
 from itertools import cycle
-from types import TracebackType
-from typing import TYPE_CHECKING, Self, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from pymodbus.exceptions import ModbusException, ModbusIOException
 
 from drivers.line import Garbled, NoReply, PortGone
 from drivers.modbus_client import BusSettings, Client, client_for
 from drivers.turns import Turns
+from instrument.closing import Closing
 from instrument.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ _MEANINGS = {
 }
 
 
-class ModbusBus:
+class ModbusBus(Closing):
     """An open line. One exchange at a time; a stop is let in first."""
 
     def __init__(self, who: str, settings: BusSettings) -> None:
@@ -63,17 +63,6 @@ class ModbusBus:
         self._gone, self._closed = "", False
         self._heard_s = time.monotonic()
         self.open(who)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Let go of the port; safe twice."""

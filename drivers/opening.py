@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from drivers.line import Line
 from drivers.motor_stage import Limits, MotorStage
 from instrument.axis_config import NewportAxis, OrientalAxis, Wired, ZaberAxis
 from instrument.camera_config import V4l2Camera
 from instrument.clock import Clock
+from instrument.closing import Closing
 from instrument.devices import Camera
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from drivers.modbus_client import BusSettings
 
 
-class Lines:
+class Lines(Closing):
     """The open ports, each once; use it with `with`."""
 
     def __init__(self, clock: Clock) -> None:
@@ -27,15 +27,8 @@ class Lines:
         self._modbus: dict[str, ModbusBus] = {}
         self._closing = ExitStack()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Let go of all of it; safe twice."""
         self._closing.close()
 
     def serial(self, who: str, port: str, baudrate: int) -> Line:

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future, wait
-from types import TracebackType
-from typing import Self, TypeVar
+from typing import TypeVar
 
 from drivers import v4l2_ioctl as v4l2
 from drivers.v4l2_capture import Traits
@@ -19,6 +18,7 @@ from drivers.v4l2_reader import Hung, Life, Reader
 from drivers.v4l2_session import EXTRA_FRAMES, Session
 from drivers.v4l2_settings import PixelFormat, V4l2Settings
 from instrument.clock import Clock
+from instrument.closing import Closing
 from instrument.devices import Frame
 from instrument.errors import DeviceError
 
@@ -33,7 +33,7 @@ _REOPEN_S, _FIRST_PAUSE_S = 2.0, 0.1
 Result = TypeVar("Result")
 
 
-class V4l2Camera:
+class V4l2Camera(Closing):
     """A camera opened, set and checked; a `with` statement or `close()` gives it back.
 
     It starts at its shortest exposure.
@@ -53,17 +53,6 @@ class V4l2Camera:
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Give the camera back; safe twice, and soon done even when a driver hangs."""

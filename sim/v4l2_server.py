@@ -8,10 +8,9 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 from struct import Struct
-from types import TracebackType
-from typing import Self
 
 from drivers import v4l2_ioctl as v4l2
+from instrument.closing import Closing
 from sim.v4l2_device import EmulatedCamera, Refused
 from sim.v4l2_stream import Stream
 
@@ -24,7 +23,7 @@ _NEXT = 0x80000000
 _KIND_NUMBERS = {name: number for number, name in reversed(v4l2.KINDS.items())}
 
 
-class V4l2Server:
+class V4l2Server(Closing):
     """Serves one emulated camera on a socket, for any number of openings, while it is open."""
 
     def __init__(self, camera: EmulatedCamera, path: Path) -> None:
@@ -36,17 +35,6 @@ class V4l2Server:
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._accept, daemon=True, name="emulated camera")
         self._thread.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Stop serving: to whoever has the camera open it is gone."""

@@ -13,11 +13,13 @@ import socket
 import threading
 import time
 import tty
+from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Literal, Protocol, Self
+from typing import Literal, Protocol
+
+from instrument.closing import Closing
 
 FaultName = Literal["drop", "delay", "late", "garbage", "truncate", "nul", "lose request", "unplug"]
 
@@ -43,7 +45,7 @@ class Fault:
     seconds: float = 0.0
 
 
-class _Wire:
+class _Wire(Closing):
     """Feeds the controllers and spoils their answers. Subclasses carry the bytes."""
 
     def __init__(self, controllers: Sequence[Controller]) -> None:
@@ -54,17 +56,6 @@ class _Wire:
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self.seen: list[tuple[float, bytes]] = []
         self._thread.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def inject(self, *faults: Fault | None) -> None:
         """Spoil the next answers, one by one; None leaves one whole."""
@@ -83,14 +74,14 @@ class _Wire:
         self._unplug()
         self._thread.join(timeout=5)
 
-    def _serve(self) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def _serve(self) -> None: ...
 
-    def _send(self, data: bytes) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def _send(self, data: bytes) -> None: ...
 
-    def _unplug(self) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def _unplug(self) -> None: ...
 
     def _arrived(self, data: bytes) -> None:
         """Pass on what the master sent, and answer."""

@@ -9,39 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from csv_texts import BARE, NAMES, problems, read
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.csv_table import read_csv
-from analysis.measurements import Measurements
 from instrument.errors import InputError
-
-NAMES = ["theta_i_deg", "theta_r_deg", "dphi_deg", "brdf", "u_brdf"]
-PLAIN = "theta_i_deg,theta_r_deg,dphi_deg,brdf,u_brdf\n30,-20.5,0,0.25,0.002\n30,10,0,-1e-3,0.002\n"
-BARE = "theta_i_deg,theta_r_deg,dphi_deg,brdf\n30,-20.5,0,0.25\n30,10,0,0.24\n"
-HEADER = "a header with theta_i_deg, theta_r_deg, dphi_deg, brdf and, where known, u_brdf"
 
 
 @pytest.fixture(autouse=True)
 def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-
-
-def read(content: str | bytes) -> Measurements:
-    path = Path("data.csv")
-    path.write_bytes(content.encode() if isinstance(content, str) else content)
-    return read_csv(path)
-
-
-def problems(content: str | bytes) -> tuple[str, ...]:
-    with pytest.raises(InputError) as caught:
-        read(content)
-    return caught.value.problems
-
-
-def changed(text: str, old: str, new: str) -> str:
-    assert text.count(old) == 1
-    return text.replace(old, new)
 
 
 ANGLE = st.floats(0, 90)
