@@ -74,12 +74,23 @@ class Engine:
 
     def _prepare(self, plan: Plan, elapsed_s: float) -> None:
         """Write down who answers, home, take the darks that need a hand."""
-        self._record.add_device("camera", self._devices.camera.identity())
-        self._record.add_device("lamp", self._devices.lamp.identity())
+        self._introduce("camera", self._devices.camera.identity())
+        self._introduce("lamp", self._devices.lamp.identity())
         for name, axis in self._devices.axes.items():
-            self._record.add_device(name, axis.identity())
+            self._introduce(name, axis.identity())
+        for axis in self._devices.axes.values():
             axis.home()
         self._exposer.begin(plan.darks_first_s, elapsed_s)
+
+    def _introduce(self, role: str, identity: str) -> None:
+        """Write down who answers; on going on with a scan it must be who answered before."""
+        before = self._record.devices().get(role)
+        if before not in (None, identity):
+            raise DeviceError(
+                f"{role}: {identity!r} answers, but the scan began with {before!r}: connect that "
+                "one again, or start a new run. Nothing has moved"
+            )
+        self._record.add_device(role, identity)
 
     def _scan(self, steps: Sequence[Step]) -> None:
         pose, waiting = home_pose(self._rig), None

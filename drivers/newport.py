@@ -120,7 +120,7 @@ class NewportStage(MotorStage):
 
     def identity(self) -> str:
         """Version of the controller, name of the stage."""
-        return f"Newport {self._port.version}, stage {self._stage}, on {self._port.line.port}"
+        return f"Newport {self._port.version}, stage {self._stage}, address {self._port.address}"
 
     def status(self) -> Status:
         """Position, state, errors."""

@@ -77,7 +77,10 @@ class OrientalSettings:
 
 
 class OrientalStage(MotorStage):
-    """One AZ drive. Drives on one port are given one `bus`, which whoever opened it closes."""
+    """One AZ drive. Drives on one port are given one `bus`, which whoever opened it closes.
+
+    `found`: what its registers said when it was opened.
+    """
 
     def __init__(
         self, name: str, settings: OrientalSettings, clock: Clock, bus: ModbusBus | None = None
@@ -89,14 +92,14 @@ class OrientalStage(MotorStage):
         self._drive = ModbusUnit(self._bus, name, settings.unit, DIRECT_DATA, _RESYNC_COUNTS)
         self._stops, self._cleared = 0, -1  # stops sent; how many of them are cleared in 007D
         try:
-            self._identity, self._target_steps = self._identify()
+            self.found, self._target_steps = self._identify()
         except BaseException:
             self.close()
             raise
 
     def identity(self) -> str:
-        """What answers where: the drive has no name or serial number to read here."""
-        return self._identity
+        """What answers: it has no name or serial number, so the unit tells two drives apart."""
+        return f"Oriental Motor AZ drive, by its registers, unit {self._settings.unit}"
 
     def status(self) -> Status:
         """Where the stage is, by its own feedback, and what its drive says of itself."""
@@ -129,11 +132,11 @@ class OrientalStage(MotorStage):
                 f"{self.name}: {self._drive.where} is no Oriental Motor AZ drive: {wrong}: look at "
                 "the port and the unit address in the rig file"
             )
-        alarm = f"alarm {output.alarm:02X}h" if output.alarm else "no alarm"
+        # It has no name or serial number: the unit address is all that tells two drives apart.
         return (
-            f"Oriental Motor AZ drive (by its registers; it tells no name) at {self._drive.where}: "
-            f"output {output.word:04X} hex, {alarm}, {data}"
-        ), data.position
+            f"Oriental Motor AZ drive, by its registers, unit {self._settings.unit}",
+            data.position,
+        )
 
     def _send_home(self) -> None:
         self._await_ready("look for its reference")

@@ -85,7 +85,7 @@ class ZaberStage(MotorStage):
 
     def identity(self) -> str:
         """Device id and serial number."""
-        return f"Zaber device {self._device_id}, serial {self._serial}, on {self._port.line.port}"
+        return f"Zaber device {self._device_id}, serial {self._serial}, axis {self._port.axis}"
 
     def status(self) -> Status:
         """Position, whether busy, and warnings, all in one reply.

@@ -303,3 +303,12 @@ def test_the_time_goes_on_after_a_resume(small: Loaded, record: Record) -> None:
     times = [r.time_s for r in record.readings()]
     assert times == sorted(times)
     assert len(set(times)) == len(plan.steps)
+
+
+def test_a_scan_goes_on_with_the_same_devices_only(small: Loaded, record: Record) -> None:
+    record.add_device("theta_r", "another stage, serial 7")
+    devices, calls = open_devices(small), []
+    axes = {n: Spy(a, calls, n) for n, a in devices.axes.items()}
+    with pytest.raises(DeviceError, match=r"theta_r: .* answers, but the scan began with 'another"):
+        run(small, record, replace(devices, axes=axes))  # type: ignore[arg-type]  # spies
+    assert not any("home" in call or "start_move" in call for call in calls)

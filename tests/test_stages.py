@@ -48,7 +48,8 @@ def bench(make: Callable[..., AbstractContextManager[Bench]]) -> Iterator[Bench]
 
 def test_it_says_who_answers(bench: Bench) -> None:
     assert any(maker in bench.stage.identity() for maker in ("SMC100", "Zaber", "AZ"))
-    assert str(bench.wire.port) in bench.stage.identity()
+    # The port is none of it: a plug may move to another.
+    assert str(bench.wire.port) not in bench.stage.identity()
 
 
 def test_nothing_moves_before_homing(bench: Bench) -> None:
