@@ -132,11 +132,8 @@ class OrientalStage(MotorStage):
                 f"{self.name}: {self._drive.where} is no Oriental Motor AZ drive: {wrong}: look at "
                 "the port and the unit address in the rig file"
             )
-        # It has no name or serial number: the unit address is all that tells two drives apart.
-        return (
-            f"Oriental Motor AZ drive, by its registers, unit {self._settings.unit}",
-            data.position,
-        )
+        alarm = f"alarm {output.alarm:02X}h" if output.alarm else "no alarm"
+        return f"output {output.word:04X} hex, {alarm}, {data}", data.position
 
     def _send_home(self) -> None:
         self._await_ready("look for its reference")

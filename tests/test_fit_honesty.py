@@ -48,7 +48,7 @@ STEPS = [
         {"albedo": 0.75, "sigma_deg": 25.0, "ks": 0.1},
     ),
 ]
-BOUNDED = 0.04  # the share of the scans that `make test` runs
+BOUNDED, FEW = 0.04, 0.02  # the share of the scans, and of the choices, that `make test` runs
 
 
 def scans(
@@ -116,7 +116,7 @@ def test_the_choice_is_the_right_one_where_the_data_tell_and_the_simpler_one_whe
     slow: bool,
     record_property: Callable[[str, object], None],
 ) -> None:
-    share = 1.0 if slow else BOUNDED
+    share = 1.0 if slow else FEW
     u, count = noise_for(simpler, right, truth, 25.0), round(500 * share)
     least = 0.95 - (0 if share == 1 else 3 * math.sqrt(0.95 * 0.05 / count))
     for name, values in ((right, truth), (simpler, plain)):
