@@ -31,10 +31,10 @@ class Lines(Closing):
         """Let go of all of it; safe twice."""
         self._closing.close()
 
-    def serial(self, who: str, port: str, baudrate: int) -> Line:
+    def serial(self, who: str, port: str, baudrate: int, xonxoff: bool = False) -> Line:
         """The line of a serial port, opened for whoever asks first."""
         if port not in self._serial:
-            line = Line(who, port, baudrate)
+            line = Line(who, port, baudrate, xonxoff)
             self._closing.callback(line.close)
             self._serial[port] = line
         return self._serial[port]
@@ -62,8 +62,9 @@ def open_stage(name: str, axis: Wired, port: str, lines: Lines) -> MotorStage:
 def _newport(name: str, axis: NewportAxis, port: str, lines: Lines) -> MotorStage:
     from drivers.newport import BAUDRATE, NewportStage
 
-    line = lines.serial(name, port, BAUDRATE[axis.model])
-    return NewportStage(name, line, axis.address, axis.model, _limits(axis), lines.clock)
+    model = axis.model
+    line = lines.serial(name, port, BAUDRATE[model], xonxoff=model == "SMC100")
+    return NewportStage(name, line, axis.address, model, _limits(axis), lines.clock)
 
 
 def _zaber(name: str, axis: ZaberAxis, port: str, lines: Lines) -> MotorStage:

@@ -86,6 +86,11 @@ class NewportAxis(_MotorAxis):
     model: Literal["SMC100", "CONEX-CC"] = "SMC100"
     address: Annotated[int, Field(ge=1, le=31)] = 1
 
+    @property
+    def place(self) -> str:
+        """Which of the devices on the port."""
+        return f"address {self.address}"
+
 
 class ZaberAxis(_MotorAxis):
     """A Zaber stage; `microsteps_per_deg` is the stage's own (X-RSW60: 4266.667)."""
@@ -95,6 +100,11 @@ class ZaberAxis(_MotorAxis):
     device: Annotated[int, Field(ge=1, le=99)] = 1
     axis: Annotated[int, Field(ge=1, le=9)] = 1
     microsteps_per_deg: Positive
+
+    @property
+    def place(self) -> str:
+        """Which of the devices on the port, and which axis of it."""
+        return f"device {self.device} axis {self.axis}"
 
 
 class OrientalAxis(_MotorAxis):
@@ -110,6 +120,11 @@ class OrientalAxis(_MotorAxis):
     steps_per_deg: Positive
     baudrate: Annotated[int, Field(ge=9600, le=921600)] = 115200
     parity: Literal["E", "N", "O"] = "E"
+
+    @property
+    def place(self) -> str:
+        """Which of the devices on the port."""
+        return f"unit {self.unit}"
 
 
 Wired = NewportAxis | ZaberAxis | OrientalAxis

@@ -212,7 +212,7 @@ class _Schema:
             return [path]
         if kind in ("union_tag_invalid", "union_tag_not_found"):
             return self._no_form(path)
-        if kind == "extra_forbidden" or item["loc"][-1] == "[key]":
+        if kind == "extra_forbidden" or item["loc"][-1:] == ("[key]",):
             self._unknown_key(path)
         elif kind == "together":
             for key, text in item["ctx"]["found"]:

@@ -6,11 +6,12 @@ pydantic models (strict, frozen, unknown keys refused); read them with `instrume
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import combinations
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from instrument.axis_config import AXES, EMULATED, Axes, HandAxis, SimulatedAxis
+from instrument.axis_config import AXES, EMULATED, Axes, HandAxis, SimulatedAxis, Wired
 from instrument.camera_config import AnyCamera, SimulatedCamera
 from instrument.section import Finite, Name, NotNegative, Positive, Section
 
@@ -100,6 +101,21 @@ class Rig(Section):
         if len(set(kinds.values())) > 1:
             what = ", ".join(f"{name} is {kind}" for name, kind in kinds.items())
             yield "axes", f"{what}; allowed: all simulated, all emulated or all real"
+        yield from self._ports_at_odds()
+
+    def _ports_at_odds(self) -> Iterator[tuple[str, str]]:
+        """Axes on one port: of one kind, each at an address of its own."""
+        axes = {name: self.axes[name] for name in AXES}
+        wired = {n: a for n, a in axes.items() if isinstance(a, Wired) and a.port != EMULATED}
+        for (one, first), (other, second) in combinations(wired.items(), 2):
+            if first.port != second.port:
+                continue
+            if first.driver != second.driver:
+                text = f"{first.driver} and {second.driver}; allowed on one port: one driver"
+                yield "axes", f"{one} and {other} are both at {first.port}, with {text}"
+            elif first.place == second.place:
+                text = f"{first.place}; allowed: an address for each"
+                yield "axes", f"{one} and {other} are both at {first.port}, {text}"
 
     def _kinds(self) -> Iterator[tuple[str, str]]:
         for name in AXES:

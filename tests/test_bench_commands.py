@@ -20,8 +20,9 @@ from conftest import CONFIGS, ROOT
 
 from acquisition.terminal import TerminalOperator
 from drivers.hand_set import HandSetAxis
+from instrument.config import load_rig
 from instrument.devices import Request
-from instrument.errors import OperatorStop
+from instrument.errors import InputError, OperatorStop
 
 BENCH, PAPER = CONFIGS / "rigs" / "bench_12bit.yaml", CONFIGS / "rigs" / "paper_1995.yaml"
 
@@ -161,6 +162,24 @@ def test_a_real_rig_without_a_terminal_is_not_even_opened(real_rig: Path, tmp_pa
     assert done.returncode == 2
     assert "standard input is no terminal" in done.stderr
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("theta_i", "words"),
+    [
+        ("{driver: newport, port: /dev/nowhere, ", "both at /dev/nowhere, address 1; allowed: an"),
+        ("{driver: zaber, port: /dev/nowhere, microsteps_per_deg: 100.0, ",
+         "both at /dev/nowhere, with zaber and newport; allowed on one port: one driver"),
+        ("{driver: newport, port: emulated, ", "axis theta_i is emulated, .*camera is real"),
+        ("{driver: simulated, ", "axis theta_i is simulated, .*axis theta_r is real"),
+    ],
+)  # fmt: skip
+def test_devices_that_do_not_go_together(real_rig: Path, theta_i: str, words: str) -> None:
+    motor = "speed_deg_per_s: 1.0, acceleration_deg_per_s2: 1.0, settle_s: 0.1, "
+    text = real_rig.read_text().replace("theta_i: {driver: hand, ", f"theta_i: {theta_i}{motor}")
+    real_rig.write_text(text)
+    with pytest.raises(InputError, match=words):
+        load_rig(real_rig)
 
 
 def test_a_missing_device_is_named_with_what_to_look_at(real_rig: Path) -> None:
