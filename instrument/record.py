@@ -21,6 +21,7 @@ from typing import Any, Literal
 
 from instrument.devices import Frame, Surface
 from instrument.errors import InputError
+from instrument.mounts import network_share
 
 SCHEMA_VERSION = 2
 FILE_NAME = "record.sqlite"
@@ -107,6 +108,7 @@ class Record:
     @classmethod
     def create(cls, folder: Path, meta: Mapping[str, str]) -> Record:
         """Start a record in `folder`, which must be absent or empty; else `InputError`."""
+        _refuse_network_share(folder)
         try:
             if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
                 raise InputError(
@@ -126,6 +128,7 @@ class Record:
     @classmethod
     def open(cls, folder: Path) -> Record:
         """Open the record of an earlier run; `InputError` when there is none or it is foreign."""
+        _refuse_network_share(folder)
         path = folder / FILE_NAME
         if not path.is_file():
             raise InputError(f"{folder}: no {FILE_NAME} there: name the folder of a run")
@@ -241,6 +244,15 @@ class Record:
     def events(self) -> Iterator[tuple[str, str, str]]:
         """Time, kind and text of every event in order."""
         yield from self._db.execute("SELECT time_utc, kind, text FROM event ORDER BY id")
+
+
+def _refuse_network_share(folder: Path) -> None:
+    share = network_share(folder)
+    if share is not None:
+        raise InputError(
+            f"{folder}: lies on a network share ({share}), where the record is not safe: name a "
+            "folder on a local disk, and copy the run afterwards"
+        )
 
 
 def _with_nan(row: tuple[Any, ...]) -> tuple[Any, ...]:

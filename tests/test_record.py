@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from instrument.errors import InputError
+from instrument.mounts import network_share
 from instrument.record import FILE_NAME, Preview, Reading, Record
 
 
@@ -93,3 +94,31 @@ def test_one_process_at_a_time_scans_into_a_run(tmp_path: Path) -> None:
                 raise AssertionError("claimed twice")
         with record.claimed() as again:
             assert again is None
+
+
+MOUNTS = r"""22 1 8:1 / / rw,relatime shared:1 - ext4 /dev/sda1 rw
+30 22 0:50 / /lab rw,relatime shared:2 - nfs4 server:/lab rw
+31 30 8:2 / /lab/local rw - xfs /dev/sdb1 rw
+32 22 0:51 / /with\040blank rw - cifs //server/share rw
+33 22 0:52 / /far rw - fuse.sshfs me@server: rw
+broken line
+"""
+
+
+@pytest.mark.parametrize(
+    ("folder", "kind"),
+    [("/home/run", None), ("/lab/run", "nfs4"), ("/lab/local/run", None), ("/laboratory", None),
+     ("/with blank/a/b", "cifs"), ("/far", "fuse.sshfs")],
+)  # fmt: skip
+def test_a_network_share_is_told_by_its_mount(tmp_path: Path, folder: str, kind: str) -> None:
+    (tmp_path / "mounts").write_text(MOUNTS)
+    assert network_share(Path(folder), tmp_path / "mounts") == kind
+    assert network_share(Path(folder), tmp_path / "none") is None
+
+
+def test_no_record_on_a_network_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("instrument.record.network_share", lambda _: "nfs4")
+    for way in (lambda: Record.create(tmp_path / "run", {}), lambda: Record.open(tmp_path)):
+        with pytest.raises(InputError, match=r"network share \(nfs4\).*a folder on a local disk"):
+            way()
+    assert not (tmp_path / "run").exists()
