@@ -117,7 +117,7 @@ def test_a_stopped_scan_goes_on_where_it_was(tmp_path: Path, protocol: Path) -> 
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL,
                           stdout=subprocess.DEVNULL, text=True) as scanning:  # fmt: skip
         wait_for_readings(folder, 5)
-        scanning.send_signal(signal.SIGINT)
+        scanning.send_signal(signal.SIGTERM)
         _, said = scanning.communicate(timeout=60)
     assert scanning.returncode == 4
     assert f"gonio resume {folder}" in said
