@@ -8,15 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.console import ask, out
+from acquisition.console import out
 from acquisition.models import check_model
 from acquisition.motion import axis_moves
 from acquisition.rig import Bench, see_emulated_camera
+from acquisition.terminal import require_yes
 from acquisition.window import Window, window_at
 from instrument.axis_config import AXES, HandAxis, MotorAxis
 from instrument.config import Loaded, load_protocol, load_rig
 from instrument.devices import Frame
-from instrument.errors import DeviceError, InputError, OperatorStop
+from instrument.errors import DeviceError, InputError
 from instrument.files import write_whole
 from instrument.pinhole import Pinhole
 from instrument.protocol_config import Protocol
@@ -207,12 +208,6 @@ def _bare(rig_path: Path | None) -> Loaded:
 
 def _confirm(rig: Rig, yes: bool, what: str) -> None:
     """Nothing real moves before somebody has said so."""
-    if yes or not rig.real:
-        return
-    if not sys.stdin.isatty():
-        raise InputError(f"{what}\nnobody to ask whether the rig is clear: add --yes")
-    if ask(f"{what} Is the rig clear? [y/N]").lower() not in (
-        "y",
-        "yes",
-    ):
-        raise OperatorStop("nothing has moved")
+    if rig.real and not yes:
+        nobody = f"{what}\nnobody to ask whether the rig is clear: add --yes"
+        require_yes(f"{what} Is the rig clear?", nobody, "nothing has moved")

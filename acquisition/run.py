@@ -13,7 +13,6 @@ from pathlib import Path
 
 from acquisition.afterwards import Afterwards
 from acquisition.console import (
-    ask,
     console,
     duration_text,
     print_outcome,
@@ -25,6 +24,7 @@ from acquisition.models import check_model
 from acquisition.motion import home_pose, moves_between
 from acquisition.plan import Plan, make_plan
 from acquisition.rig import open_devices, prepare
+from acquisition.terminal import require_yes
 from instrument.config import Loaded, load_protocol
 from instrument.errors import DeviceError, InputError, OperatorStop
 from instrument.files import write_whole
@@ -191,10 +191,9 @@ def as_used(record: Record) -> Loaded:
 
 def _confirm(yes: bool, steps: int) -> None:
     """Nothing moves again until the operator has said so."""
-    question = f"{steps} readings are missing. Is the rig clear, may the stage move? [y/N]"
-    if yes:
-        return
-    if not sys.stdin.isatty():
-        raise InputError("gonio resume: nobody to ask whether the rig may move: add --yes")
-    if ask(question).lower() not in ("y", "yes"):
-        raise OperatorStop("not resumed: nothing has moved")
+    if not yes:
+        require_yes(
+            f"{steps} readings are missing. Is the rig clear, may the stage move?",
+            "gonio resume: nobody to ask whether the rig may move: add --yes",
+            "not resumed: nothing has moved",
+        )

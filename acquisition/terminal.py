@@ -26,6 +26,22 @@ class TerminalOperator:
         return answer or "done"
 
 
+def require_yes(question: str, nobody: str, otherwise: str) -> None:
+    """Nothing moves before somebody has said so.
+
+    Raises `InputError` with `nobody` where none can be asked, `OperatorStop` with `otherwise` on
+    any answer but yes.
+    """
+    if not sys.stdin.isatty():
+        raise InputError(nobody)
+    try:
+        answer = ask(f"{question} [y/N]")
+    except EOFError:
+        answer = ""
+    if answer.lower() not in ("y", "yes"):
+        raise OperatorStop(otherwise)
+
+
 def require_terminal(what: str) -> None:
     """Raise `InputError` where nobody can answer a prompt, before anything moves."""
     if not sys.stdin.isatty():
