@@ -9,8 +9,9 @@ import logging
 import select
 import socket
 import time
+from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 from urllib.parse import urlsplit
 
 import serial
@@ -37,21 +38,12 @@ class BusSettings:
     reply_s: float = REPLY_S
 
 
-class SerialClient(ModbusSerialClient):
+class _Prompt:
     """Hears at once what comes, and no longer than until its deadline."""
 
     deadline_s = 0.0
     heard = b""
-
-    def connect(self) -> bool:
-        """Open it, if it is not; the error says why it cannot be."""
-        if self.socket is None:
-            how = self.comm_params
-            self.socket = serial.serial_for_url(
-                how.host, baudrate=how.baudrate, parity=how.parity, timeout=0,
-                write_timeout=how.timeout_connect, exclusive=True,
-            )  # fmt: skip
-        return True
+    socket: Any  # pymodbus' name for what is open: a serial port or a socket
 
     def close(self) -> None:
         """Let go of it; safe twice."""
@@ -68,16 +60,33 @@ class SerialClient(ModbusSerialClient):
     def listen(self, seconds: float) -> bytes:
         """What comes within `seconds`; empty when nothing does."""
         port = self.socket
-        if port is None or not _ready(port.fileno(), seconds):
-            return b""
+        ready = port is not None and _ready(port.fileno(), seconds)
+        return self._read(port) if ready else b""
+
+    @abstractmethod
+    def _read(self, port: Any) -> bytes:
+        """What has come."""
+
+
+class SerialClient(_Prompt, ModbusSerialClient):
+    """Over a serial port."""
+
+    def connect(self) -> bool:
+        """Open it, if it is not; the error says why it cannot be."""
+        if self.socket is None:
+            how = self.comm_params
+            self.socket = serial.serial_for_url(
+                how.host, baudrate=how.baudrate, parity=how.parity, timeout=0,
+                write_timeout=how.timeout_connect, exclusive=True,
+            )  # fmt: skip
+        return True
+
+    def _read(self, port: Any) -> bytes:
         return bytes(port.read(port.in_waiting or 1))
 
 
-class TcpClient(ModbusTcpClient):
-    """The same over a socket; a connection that the gateway has closed is an error."""
-
-    deadline_s = 0.0
-    heard = b""
+class TcpClient(_Prompt, ModbusTcpClient):
+    """Over a socket; a connection that the gateway has closed is an error."""
 
     def connect(self) -> bool:
         """Open it, if it is not; the error says why it cannot be."""
@@ -87,24 +96,8 @@ class TcpClient(ModbusTcpClient):
             self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return True
 
-    def close(self) -> None:
-        """Let go of it; safe twice."""
-        port, self.socket = self.socket, None
-        if port is not None:
-            port.close()
-
-    def recv(self, _size: int | None) -> bytes:
-        """What comes before the deadline, of whatever size."""
-        data = self.listen(self.deadline_s - time.monotonic())
-        self.heard += data
-        return data
-
-    def listen(self, seconds: float) -> bytes:
-        """What comes within `seconds`; empty when nothing does."""
-        peer = self.socket
-        if peer is None or not _ready(peer.fileno(), seconds):
-            return b""
-        data = peer.recv(4096)
+    def _read(self, port: Any) -> bytes:
+        data = bytes(port.recv(4096))
         if not data:
             raise ConnectionException("closed by the gateway")
         return data
