@@ -11,14 +11,14 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from types import TracebackType
 
+from instrument.closing import Closing
 from instrument.errors import GonioError
 
 GO = "go\n"  # the word that the record is complete
 
 
-class Afterwards:
+class Afterwards(Closing):
     """The waiting process; use it with `with`, and call `finish` once the record is complete."""
 
     def __init__(self, folder: Path, as_json: bool) -> None:
@@ -31,15 +31,8 @@ class Afterwards:
         )
         self._folder = folder
 
-    def __enter__(self) -> Afterwards:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Let it end, by itself where it was not asked to finish."""
         self._process.communicate()
 
     def finish(self) -> None:

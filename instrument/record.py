@@ -16,9 +16,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal
 
+from instrument.closing import Closing
 from instrument.devices import Frame, Surface
 from instrument.errors import InputError
 from instrument.mounts import network_share
@@ -98,7 +98,7 @@ _READING_COLUMNS = ", ".join(
 )
 
 
-class Record:
+class Record(Closing):
     """An open record; use it with `with`. Every `add_` is on disk when it returns."""
 
     def __init__(self, connection: sqlite3.Connection, folder: Path) -> None:
@@ -164,15 +164,8 @@ class Record:
             lock.flush()
             yield
 
-    def __enter__(self) -> Record:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Close the file; safe twice."""
         self._db.close()
 
     def meta(self, key: str) -> str | None:

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 from instrument.config import Loaded, load_protocol
 from instrument.rig_config import Rig
+
+if TYPE_CHECKING:
+    from v4l2_rig import RemoteCamera
 
 ROOT = Path(__file__).resolve().parent.parent
 CONFIGS = ROOT / "configs"
@@ -34,6 +39,15 @@ def cpu_seconds(action: Callable[[], object], repeats: int) -> float:
     return min(times)
 
 
+def gonio(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run the command from the project's folder, with nobody at its terminal."""
+    return subprocess.run(
+        [sys.executable, "-m", "acquisition", *map(str, arguments)],
+        cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
+        stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="run the long proofs whole")
     real = parser.getgroup("real devices", "tests marked hil")
@@ -52,6 +66,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if item.get_closest_marker("hil"):
             item.add_marker(refused)
+
+
+@pytest.fixture(scope="module")
+def remote(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RemoteCamera]:
+    """A child process that sees the emulated V4L2 camera."""
+    from v4l2_rig import child
+
+    with child(tmp_path_factory) as one:
+        yield one
 
 
 @pytest.fixture

@@ -8,7 +8,6 @@ import os
 import pty
 import re
 import select
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -16,7 +15,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from conftest import CONFIGS, ROOT
+from conftest import CONFIGS, ROOT, gonio
 
 from acquisition.terminal import TerminalOperator
 from drivers.hand_set import HandSetAxis
@@ -25,14 +24,6 @@ from instrument.devices import Request
 from instrument.errors import InputError, OperatorStop
 
 BENCH, PAPER = CONFIGS / "rigs" / "bench_12bit.yaml", CONFIGS / "rigs" / "paper_1995.yaml"
-
-
-def gonio(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "acquisition", *map(str, arguments)],
-        cwd=ROOT, capture_output=True, text=True, timeout=120, check=False,
-        stdin=subprocess.DEVNULL,
-    )  # fmt: skip
 
 
 def test_an_axis_is_homed_and_moved() -> None:

@@ -15,21 +15,13 @@ from pathlib import Path
 
 import pytest
 import yaml
-from conftest import CONFIGS, ROOT
+from conftest import CONFIGS, ROOT, gonio
 
 pytestmark = pytest.mark.skipif(
     shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"
 )
 RIG = CONFIGS / "rigs" / "emulated.yaml"
 TRUTH = {"albedo": 0.80, "sigma_deg": 20.0, "ks": 0.076}
-
-
-def gonio(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "acquisition", *map(str, arguments)],
-        cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
-        stdin=subprocess.DEVNULL,
-    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")

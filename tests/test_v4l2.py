@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import random
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,6 @@ from v4l2_rig import (
     SETTINGS,
     Bench,
     RemoteCamera,
-    child,
     level,
     served,
     steps,
@@ -33,12 +31,6 @@ from drivers.v4l2_settings import PixelFormat, V4l2Settings
 from instrument.errors import DeviceError
 from sim.v4l2_device import Exposure
 from sim.v4l2_shim import compiled
-
-
-@pytest.fixture(scope="module")
-def remote(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RemoteCamera]:
-    with child(tmp_path_factory) as one:
-        yield one
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import errno
 import re
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +18,6 @@ from v4l2_rig import (
     SETTINGS,
     Bench,
     RemoteCamera,
-    child,
     level,
     served,
     steps,
@@ -31,12 +30,6 @@ from sim.v4l2_device import EmulatedCamera, Exposure
 
 WHO = re.escape(f"camera Emulated camera ({DEVICE})")
 FOUND_WITHIN_S = 2.0  # beyond the exposure
-
-
-@pytest.fixture(scope="module")
-def remote(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RemoteCamera]:
-    with child(tmp_path_factory) as one:
-        yield one
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +15,6 @@ from v4l2_rig import (
     SETTINGS,
     Bench,
     RemoteCamera,
-    child,
     served,
 )
 
@@ -25,12 +24,6 @@ from sim.v4l2_device import Faults
 
 WHO = re.escape(f"camera Emulated camera ({DEVICE})")
 FOUND_WITHIN_S = 2.0  # beyond the exposure
-
-
-@pytest.fixture(scope="module")
-def remote(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RemoteCamera]:
-    with child(tmp_path_factory) as one:
-        yield one
 
 
 @pytest.fixture
