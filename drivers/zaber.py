@@ -79,6 +79,7 @@ class ZaberStage(MotorStage):
         self._who = f"{name} (Zaber, device {device} axis {axis} on {line.port})"
         self._port = ZaberPort(line, device, axis, self._who)
         self._steps_per_deg = microsteps_per_deg
+        self._rests = False
         self._device_id = self._whole("deviceid", axis=0)
         self._serial = self._port.ask("get system.serial", axis=0).data
         self._range = self._angle("limit.min"), self._angle("limit.max")
@@ -91,8 +92,13 @@ class ZaberStage(MotorStage):
         """Position, whether busy, and warnings, all in one reply.
 
         That reply shows the most urgent warning only; behind one there may be that it is not homed.
+        Whether it takes position and state at one instant is not documented, so the first reply
+        that says that the axis stands is asked for again: the position is then one of rest.
         """
         reply = self._port.ask("get pos")
+        if not (self._rests or reply.busy):
+            reply = self._port.ask("get pos")
+        self._rests = not reply.busy
         position = self._value(reply, "pos") / self._steps_per_deg
         flags = [reply.warning]
         if reply.warning != framing.NO_WARNING:
@@ -140,6 +146,7 @@ class ZaberStage(MotorStage):
         self._sent(lambda: self._port.tell(f"move abs {steps}"))
 
     def _sent(self, action: Callable[[], object]) -> None:
+        self._rests = False
         try:
             action()
         except (NoReply, Garbled):

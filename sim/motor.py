@@ -77,6 +77,12 @@ class Motor:
             self._move = self._over(angle_deg - self._from_deg)
             self._started_s = self._clock.now_s()
 
+    def end_move(self) -> None:
+        """The move has just come to its end."""
+        with self._lock:
+            self._from_deg += self._move.distance_deg
+            self._move = self._over(0.0)
+
     def stop(self) -> None:
         """Stand still where it is."""
         with self._lock:

@@ -55,6 +55,7 @@ class ZaberController:
         return self._reply(axis or "0", number, flag, data)
 
     def _reply(self, axis: str, number: str | None, flag: str, data: str) -> bytes:
+        """State as it is after the command: a move may have ended since its position was read."""
         status = "BUSY" if self.motor.moving else "IDLE"
         head = f"{self.device:02d} {axis}" + (f" {number}" if number else "")
         body = f"{head} {flag} {status} {(self._warnings() or ['--'])[0]} {data}"

@@ -18,9 +18,12 @@ from drivers.line import Garbled, Line, PortGone
 from drivers.motor_stage import Stopped
 from drivers.newport import NewportStage
 from drivers.turns import Turns
+from drivers.zaber import ZaberStage
 from instrument.clock import SystemClock
 from instrument.errors import DeviceError
+from sim.motor import Motor
 from sim.wire import PtyWire
+from sim.zaber_controller import MICROSTEPS_PER_DEG, ZaberController
 
 pytestmark = pytest.mark.waits
 
@@ -110,7 +113,7 @@ def test_a_stop_from_another_thread_ends_the_move(
         with pytest.raises(Stopped, match=r"theta_r: stopped at [\d.]+ deg"):
             bench.stage.wait()
         stopper.join()
-        assert not bench.motor.moving
+        until(lambda: not bench.motor.moving)  # on the wire is not yet read
         assert 1.0 < bench.motor.position_deg < 60.0
         bench.stage.stop()
         bench.stage.start_move(0.0)  # and it may be told to go on
@@ -252,6 +255,24 @@ def test_newport_states(text: str, name: str, moving: bool, homed: bool, fault: 
 def test_newport_states_that_are_none(text: str) -> None:
     with pytest.raises(Garbled, match="theta_r: answers TS with"):
         newport_framing.state("theta_r", text)
+
+
+class _StandsBetween(ZaberController):
+    """Its axis comes to rest after the position of a reply was read, before its state is."""
+
+    def _get(self, setting: str) -> tuple[str, str]:
+        said = super()._get(setting)
+        self.motor.end_move()
+        return said
+
+
+def test_a_zaber_position_is_one_of_rest_even_when_the_move_ends_within_a_reply() -> None:
+    motor = Motor(SLOW, SystemClock())
+    with PtyWire([_StandsBetween(motor)]) as wire, Line("theta_r", wire.port, 115200) as line:
+        stage = ZaberStage("theta_r", line, 1, 1, MICROSTEPS_PER_DEG, LIMITS, SystemClock())
+        stage.home()
+        stage.start_move(0.005)  # so short that even its beginning is within the tolerance
+        assert stage.wait() == pytest.approx(0.005, abs=1e-3)
 
 
 def test_zaber_checksum_is_the_manual_s() -> None:
