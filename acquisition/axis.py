@@ -30,6 +30,17 @@ class Axis:
         """Find the reference."""
         self._stage.home()
 
+    def homed(self) -> bool:
+        """Whether it still knows its reference."""
+        return self._stage.homed()
+
+    def settings(self) -> dict[str, str]:
+        """What the stage says that it is set to, with the rig file's zero and sign."""
+        own = self._settings
+        if isinstance(own, HandAxis):
+            return self._stage.settings()
+        return {"zero_deg": f"{own.zero_deg:g}", "sign": str(own.sign), **self._stage.settings()}
+
     def position_deg(self) -> float:
         """Where the axis is."""
         return self._settings.from_device_deg(self._stage.position_deg())

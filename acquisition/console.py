@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from acquisition.kept_frames import kept_bytes
 from acquisition.plan import Plan, Step, lamp_settings
 from instrument.config import Loaded
 
@@ -101,6 +102,8 @@ def _plan_rows(loaded: Loaded, plan: Plan) -> Iterator[tuple[str, str]]:
         f"places sample or tile {plan.swaps} times, sets the lamp {plan.hand_settings} times"
         + (", covers it once" if plan.darks_first_s else ""),
     )
+    if loaded.protocol.keep_frames:
+        yield "frames", f"all kept, {kept_bytes(plan, loaded) / 1e6:.0f} MB"
     yield "duration", f"about {duration_text(plan.duration_s)}"
 
 

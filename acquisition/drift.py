@@ -2,63 +2,98 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from instrument.geometry import FloatArray
-from instrument.record import Reading
+from instrument.reading import Check, Reading
 
 LEAST_SIGNAL_U = 10.0  # a check with less signal than this many u follows noise and not the lamp
+JUMP_U, LEAST_JUMP = 4.0, 0.003  # a lamp has jumped when it is off by more than both of these
 
 
 @dataclass(frozen=True, slots=True)
-class Drift:
-    """The lamp's level in one block relative to its first check; without checks 1 throughout.
+class _Stretch:
+    """Checks between which the lamp ages evenly.
 
-    times_s, level, u_relative: one entry a check; u_relative is the noise of that check.
+    times_s, level, u_relative: one entry a check, the level relative to the block's first check.
     """
 
     times_s: FloatArray
     level: FloatArray
     u_relative: FloatArray
 
-    @classmethod
-    def of(cls, readings: Sequence[Reading], block: int) -> Drift:
-        """From the usable checks made in one block of the plan."""
-        checks = [r for r in readings if r.kind == "drift" and r.block == block and usable(r)]
-        rates = np.array([rate(r) for r in checks])
-        return cls(
-            np.array([r.time_s for r in checks]),
-            rates / rates[0] if rates.size else rates,
-            # The same geometry again: placement and rounding are the same each time, noise is not.
-            np.array([r.u_noise_dn / r.signal_dn for r in checks]),
-        )
-
     @property
-    def _slope_per_s(self) -> float:
+    def slope_per_s(self) -> float:
         """Mean change over all checks."""
         if self.times_s.size < 2:
             return 0.0
         return float((self.level[-1] - self.level[0]) / (self.times_s[-1] - self.times_s[0]))
 
-    def _outside_s(self, time_s: float) -> float:
+    def outside_s(self, time_s: float) -> float:
         """Seconds from the nearest check, negative before the first, 0 between them."""
         return float(time_s - np.clip(time_s, self.times_s[0], self.times_s[-1]))
 
     def at(self, time_s: float) -> float:
         """Level by straight lines between the checks, and by the mean slope beyond them."""
-        if not self.times_s.size:
-            return 1.0
         inside = float(np.interp(time_s, self.times_s, self.level))
-        return inside + self._slope_per_s * self._outside_s(time_s)
+        return inside + self.slope_per_s * self.outside_s(time_s)
+
+    def shares(self, time_s: float) -> FloatArray:
+        """How much each check counts for a value at that time."""
+        return np.array([np.interp(time_s, self.times_s, row) for row in np.eye(self.level.size)])
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """The lamp's level in one block relative to its first check; without checks 1 throughout.
+
+    stretches: one, and one more for each time that a scan went on with a lamp that had jumped.
+    first_rate: counts per second of the first check, to which levels refer.
+    """
+
+    stretches: tuple[_Stretch, ...]
+    first_rate: float
+
+    @classmethod
+    def of(cls, readings: Sequence[Reading], block: int, checks: Sequence[Check] = ()) -> Drift:
+        """From the usable checks made in one block of the plan, and those at a resume."""
+        made = [r for r in readings if r.kind == "drift" and r.block == block and usable(r)]
+        if not made:
+            return cls((), math.nan)
+        jumps = [c for c in checks if c.jumped and c.reading.block == block]
+        bounds = [-1, *(c.before_step for c in jumps), math.inf]
+        heads: list[list[Reading]] = [[], *([c.reading] for c in jumps)]
+        groups = [
+            [*head, *(r for r in made if low <= r.step < high)]
+            for head, low, high in zip(heads, bounds[:-1], bounds[1:], strict=True)
+        ]
+        first = rate(made[0])
+        return cls(tuple(_stretch(group, first) for group in groups if group), first)
+
+    @property
+    def level(self) -> FloatArray:
+        """The level at every check."""
+        return np.concatenate([[], *(s.level for s in self.stretches)])
+
+    def at(self, time_s: float) -> float:
+        """The level at a time of the scan."""
+        stretch = self._stretch(time_s)
+        return 1.0 if stretch is None else stretch.at(time_s)
 
     def u_beyond(self, time_s: float) -> float:
         """Standard uncertainty of the level beyond the checks: half of what was extrapolated."""
-        if not self.times_s.size:
-            return 0.0
-        return abs(self._slope_per_s * self._outside_s(time_s)) / 2
+        stretch = self._stretch(time_s)
+        return 0.0 if stretch is None else abs(stretch.slope_per_s * stretch.outside_s(time_s)) / 2
+
+    def foretold(self, time_s: float) -> tuple[float, float]:
+        """Counts per second of the next check and their relative u, from the last one's."""
+        last = self.stretches[-1]
+        u_relative = math.hypot(float(last.u_relative[-1]), self.u_beyond(time_s))
+        return self.first_rate * last.at(time_s), u_relative
 
     def shifts(self, time_s: float) -> FloatArray:
         """What one standard deviation of each check's noise does to a value corrected by `at`.
@@ -66,10 +101,27 @@ class Drift:
         Relative; a value between two checks has a part of both, and every value the opposite of
         the first one's, to which the levels are referred.
         """
-        shares = np.array([np.interp(time_s, self.times_s, row) for row in np.eye(len(self.level))])
+        own = self._stretch(time_s)
+        parts = [s.shares(time_s) if s is own else np.zeros(s.level.size) for s in self.stretches]
+        shares = np.concatenate([[], *parts])
         if shares.size:
             shares[0] -= 1.0
-        return -shares * self.u_relative
+        u_relative: FloatArray = np.concatenate([[], *(s.u_relative for s in self.stretches)])
+        return -shares * u_relative
+
+    def _stretch(self, time_s: float) -> _Stretch | None:
+        """The one that began last before that time."""
+        begun = [s for s in self.stretches[1:] if s.times_s[0] < time_s]
+        return (*self.stretches[:1], *begun)[-1] if self.stretches else None
+
+
+def _stretch(checks: Sequence[Reading], first_rate: float) -> _Stretch:
+    return _Stretch(
+        np.array([r.time_s for r in checks]),
+        np.array([rate(r) / first_rate for r in checks]),
+        # The same geometry again: placement and rounding are the same each time, noise is not.
+        np.array([r.u_noise_dn / r.signal_dn for r in checks]),
+    )
 
 
 def usable(check: Reading) -> bool:

@@ -1,38 +1,41 @@
 """The engine: move, settle, expose; while the stage moves on, reduce and write down.
 
 Knows devices only by their interfaces. Every reading is on disk before the next move counts as
-done. Whatever ends a scan, the motion is stopped and the lamp darkened.
+done. Whatever ends a scan, the motion is stopped and the lamp darkened, and nothing moves again in
+this process: to go on is the operator's word.
 """
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 from acquisition.axis import Axis
 from acquisition.exposing import Exposed, Exposer
-from acquisition.motion import Move, home_pose, moves_between
+from acquisition.going_on import SoFar, describe, where_it_stood
+from acquisition.kept_frames import keep
+from acquisition.motion import NoPathError
 from acquisition.plan import Plan, Step
+from acquisition.positioning import Positioner
 from acquisition.preview import preview_of
 from acquisition.radiometry import Signal, measure
 from acquisition.window import Window, window_at
 from instrument.clock import Clock
-from instrument.devices import Camera, Lamp, Operator, Request, Surface
+from instrument.devices import Camera, Lamp, Operator, Surface
 from instrument.errors import DeviceError
 from instrument.pinhole import Pinhole
 from instrument.protocol_config import Protocol
-from instrument.record import Reading, Record
+from instrument.reading import Reading
+from instrument.record import Record
 from instrument.rig_config import Rig
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
 class Devices:
-    """What the engine drives. `begin_step` tells a simulated scene which step comes next.
+    """What the engine drives.
 
-    `close` lets go of them all.
+    `begin_step` tells a simulated scene which step comes next, and at which time of the plan it is
+    read. `close` lets go of them all.
     """
 
     axes: dict[str, Axis]
@@ -40,7 +43,7 @@ class Devices:
     lamp: Lamp
     operator: Operator
     clock: Clock
-    begin_step: Callable[[int], None]
+    begin_step: Callable[[int, float], None]
     close: Callable[[], None] = lambda: None
 
 
@@ -58,29 +61,39 @@ class Engine:
         self._protocol, self._rig, self._devices = protocol, rig, devices
         self._record, self._on_step = record, on_step
         self._pinhole = Pinhole.of(rig)
-        self._surface: Surface | None = None
+        self._ended = False
+        self._hands = Positioner(rig, devices.axes, devices.lamp, devices.operator, self._answered)
         self._exposer = Exposer(devices.camera, devices.lamp, devices.clock, protocol, rig, record)
 
-    def run(self, plan: Plan, done: frozenset[int] = frozenset(), elapsed_s: float = 0.0) -> None:
-        """Run all steps but those `done` in the `elapsed_s` that the scan has taken already.
+    def run(self, plan: Plan, so_far: SoFar | None = None) -> None:
+        """Run all steps, or those that are missing `so_far` of a scan that was stopped.
 
-        Leaves a safe rig behind, whatever happens.
+        Leaves a safe rig behind, whatever happens, and refuses (`DeviceError`) to run again.
         """
+        if self._ended:
+            raise DeviceError(
+                "the scan has ended and the rig was made safe: nothing moves again before the "
+                "operator has said so: gonio resume"
+            )
         try:
-            self._prepare(plan, elapsed_s)
-            self._scan([step for step in plan.steps if step.index not in done])
+            self._introduce_all()
+            if so_far is None:
+                self._begin(plan)
+                self._scan(plan.steps)
+            else:
+                self._go_on(plan, so_far)
+                self._scan(so_far.missing(plan))
         finally:
-            self._make_safe()
+            self._ended = True
+            self._hands.make_safe()
 
-    def _prepare(self, plan: Plan, elapsed_s: float) -> None:
-        """Write down who answers, home, take the darks that need a hand."""
-        self._introduce("camera", self._devices.camera.identity())
-        self._introduce("lamp", self._devices.lamp.identity())
-        for name, axis in self._devices.axes.items():
-            self._introduce(name, axis.identity())
-        for axis in self._devices.axes.values():
-            axis.home()
-        self._exposer.begin(plan.darks_first_s, elapsed_s)
+    def _introduce_all(self) -> None:
+        devices = self._devices
+        named: dict[str, Camera | Axis] = {"camera": devices.camera, **devices.axes}
+        for role, device in named.items():
+            self._introduce(role, device.identity())
+            self._record.add_settings(devices.clock.utc().isoformat(), role, device.settings())
+        self._introduce("lamp", devices.lamp.identity())
 
     def _introduce(self, role: str, identity: str) -> None:
         """Write down who answers; on going on with a scan it must be who answered before."""
@@ -92,49 +105,76 @@ class Engine:
             )
         self._record.add_device(role, identity)
 
+    def _begin(self, plan: Plan) -> None:
+        """Home, take the darks that need a hand."""
+        self._hands.home()
+        self._open_shutter()
+        self._exposer.start(0.0)
+        self._exposer.take_darks(plan.darks_first_s)
+
+    def _go_on(self, plan: Plan, so_far: SoFar) -> None:
+        """Bring the rig where the scan stood, look whether the lamp is what it was."""
+        first = so_far.missing(plan)[0]
+        self._hands.find()
+        self._open_shutter()
+        self._exposer.know(so_far.readings)
+        self._exposer.take_darks(plan.darks_first_s)
+        self._check_drift(plan, so_far, first)
+        stood = where_it_stood(so_far.readings, first, plan)
+        if stood is not None:
+            self._return_to(stood, first.surface)
+        self._exposer.start(so_far.elapsed_s)
+
+    def _open_shutter(self) -> None:
+        """However the lamp was left."""
+        if self._rig.lamp.darkened_by == "shutter":
+            self._devices.lamp.light()
+
+    def _check_drift(self, plan: Plan, so_far: SoFar, first: Step) -> None:
+        """Measure the drift reference again, if the scan has one to compare with."""
+        repeated = so_far.drift_step(plan, first.block)
+        if repeated is None:
+            return
+        # A number of its own, so that a simulated scene gives it noise of its own.
+        own = replace(repeated, index=len(plan.steps) + len(so_far.checks), preview=False)
+        self._devices.begin_step(own.index, first.start_s)
+        self._place(own.surface)
+        self._hands.go(own.pose)
+        exposed = self._exposer.expose(own, self._window(own))
+        reading = replace(
+            self._reduced(exposed),
+            step=repeated.index, time_s=so_far.elapsed_s, free_s=so_far.elapsed_s,
+        )  # fmt: skip
+        check = so_far.check(reading, first)
+        self._record.add_check(check)
+        self._event("drift", describe(check))
+
+    def _return_to(self, stood: Step, next_surface: Surface) -> None:
+        """Stand as after the last accepted step: then the next is come to as it would have been."""
+        if stood.surface == next_surface:
+            self._place(next_surface)
+        try:
+            self._hands.go(stood.pose)
+        except NoPathError:
+            return  # no straight way back; there is one to the next step, from here
+
     def _scan(self, steps: Sequence[Step]) -> None:
-        pose, waiting = home_pose(self._rig), None
+        waiting = None
         for step in steps:
-            self._devices.begin_step(step.index)
-            if step.surface != self._surface:
+            self._devices.begin_step(step.index, step.start_s + step.duration_s)
+            if step.surface != self._hands.surface:
                 self._accept(waiting)  # the operator may take their time, or give up
                 waiting = None
                 self._place(step.surface)
-            moves = moves_between(pose, step.pose, self._rig)
-            started = self._start_first(moves)
+            self._hands.set_out(step.pose)
             self._accept(waiting)
-            self._finish(moves, started)
+            self._hands.arrive()
             waiting = self._exposer.expose(step, self._window(step))
-            pose = step.pose
         self._accept(waiting)
 
-    def _start_first(self, moves: Sequence[Move]) -> bool:
-        """Set the first motor going, so that reduction runs while it moves."""
-        if not moves or self._devices.axes[moves[0].axis].by_hand:
-            return False
-        self._devices.axes[moves[0].axis].start_move(moves[0].angle_deg)
-        return True
-
-    def _finish(self, moves: Sequence[Move], started: bool) -> None:
-        """Make the moves one after the other, then let the axes come to rest."""
-        for number, move in enumerate(moves):
-            axis = self._devices.axes[move.axis]
-            if number > 0 or not started:
-                axis.start_move(move.angle_deg)
-            axis.finish_move()
-            if axis.by_hand:
-                said = axis.position_deg()
-                self._event("operator", f"{move.axis} set to {said:g} deg")
-        for name in dict.fromkeys(move.axis for move in moves):
-            self._devices.axes[name].settle()
-
     def _place(self, surface: Surface) -> None:
-        """Have the operator put sample or white tile on the table."""
         name = self._protocol.sample.name if surface == "sample" else "the white tile"
-        request = Request("place", f"Put {name} on the sample table", surface=surface)
-        answer = self._devices.operator.ask(request)
-        self._event("operator", f"{request.text}: {answer}")
-        self._surface = surface
+        self._hands.place(surface, name)
 
     def _window(self, step: Step) -> Window:
         patch = self._protocol.window
@@ -144,7 +184,18 @@ class Engine:
         """Reduce the frames of a step and commit them."""
         if exposed is None:
             return
-        step, window = exposed.step, self._window(exposed.step)
+        step, reading = exposed.step, self._reduced(exposed)
+        preview = None
+        if step.preview:
+            preview = preview_of(exposed, self._window(step), self._rig.camera.max_dn)
+        kept = self._protocol.keep_frames
+        files = keep(exposed.frames, step.index, self._record.folder) if kept else ()
+        self._record.add_reading(reading, preview, exposed.frames, files)
+        self._exposer.seen(reading)
+        self._on_step(step)
+
+    def _reduced(self, exposed: Exposed) -> Reading:
+        window = self._window(exposed.step)
         signal = measure(
             exposed.frames,
             exposed.dark,
@@ -153,22 +204,10 @@ class Engine:
             self._rig.u_placement_mm,
             self._protocol.window.min_pixels,
         )
-        preview = preview_of(exposed, window, self._rig.camera.max_dn) if step.preview else None
-        self._record.add_reading(_reading(exposed, window, signal), preview, exposed.frames)
-        self._on_step(step)
+        return _reading(exposed, window, signal)
 
-    def _make_safe(self) -> None:
-        """Stop every axis and shut the lamp off, even when one of them fails to answer."""
-        safe: list[tuple[str, Callable[[], None]]] = [
-            (name, axis.stop) for name, axis in self._devices.axes.items()
-        ]
-        if self._rig.lamp.darkened_by == "shutter":
-            safe.append(("lamp", self._devices.lamp.darken))
-        for name, action in safe:
-            try:
-                action()
-            except (DeviceError, OSError) as error:
-                log.error("%s could not be made safe: %s", name, error)
+    def _answered(self, text: str) -> None:
+        self._event("operator", text)
 
     def _event(self, kind: str, text: str) -> None:
         self._record.add_event(self._devices.clock.utc().isoformat(), kind, text)
@@ -190,6 +229,7 @@ def _reading(exposed: Exposed, window: Window, signal: Signal) -> Reading:
         frames=len(exposed.frames),
         window_pixels=window.pixels,
         time_s=exposed.time_s,
+        free_s=exposed.free_s,
         time_utc=exposed.time_utc,
         **asdict(signal),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -14,6 +15,7 @@ from acquisition.window import Window
 from instrument.clock import Clock
 from instrument.devices import Camera, Frame, Lamp, Surface
 from instrument.protocol_config import Protocol
+from instrument.reading import Reading
 from instrument.record import Record
 from instrument.rig_config import Rig
 
@@ -22,12 +24,16 @@ MAX_EXPOSURES_TRIED = 8  # from one end of any camera's ladder to the other in f
 
 @dataclass(frozen=True, slots=True)
 class Exposed:
-    """Frames of a step on their way to the record; `time_s` counts from the start of the scan."""
+    """Frames of a step on their way to the record.
+
+    `time_s` counts from the start of the scan; at `free_s` the rig can go on.
+    """
 
     step: Step
     frames: list[Frame]
     dark: Dark
     time_s: float
+    free_s: float
     time_utc: str
 
 
@@ -43,13 +49,22 @@ class Exposer:
     record: Record
     _start_s: float = 0.0
     _darks: dict[float, Dark] = field(default_factory=dict)
-    _rate_dn_per_s: dict[Surface, float] = field(default_factory=dict)
+    _before: frozenset[float] = frozenset()
+    _last: dict[Surface, Reading] = field(default_factory=dict)
 
-    def begin(self, darks_first_s: Sequence[float], elapsed_s: float) -> None:
-        """Start the scan's time, or go on with it; take the darks that need a hand."""
+    def know(self, readings: Sequence[Reading]) -> None:
+        """What a stopped scan has read already, in order: brightness, and whose darks are taken."""
+        for reading in readings:
+            self.seen(reading)
+        self._before = frozenset(reading.exposure_s for reading in readings)
+
+    def seen(self, reading: Reading) -> None:
+        """From its brightness the next exposure of that surface is guessed."""
+        self._last[reading.surface] = reading
+
+    def start(self, elapsed_s: float) -> None:
+        """Start the scan's time, or go on with it."""
         self._start_s = self.clock.now_s() - elapsed_s
-        if darks_first_s:
-            self._take_darks(darks_first_s)
 
     def expose(self, step: Step, window: Window) -> Exposed:
         """All frames of a step, none of them saturated where the camera's range allows it."""
@@ -57,8 +72,12 @@ class Exposer:
         frames = [first]
         if step.frames > 1:
             frames += self.camera.grab(step.frames - 1)
-        time_s, time_utc = self.clock.now_s() - self._start_s, self.clock.utc().isoformat()
-        return Exposed(step, frames, self._dark(first.exposure_s), time_s, time_utc)
+        time_s, time_utc = self._scan_s(), self.clock.utc().isoformat()
+        dark = self._dark(first.exposure_s)
+        return Exposed(step, frames, dark, round(time_s, 3), self._scan_s(), time_utc)
+
+    def _scan_s(self) -> float:
+        return self.clock.now_s() - self._start_s
 
     def _first_frame(self, step: Step, window: Window) -> Frame:
         """Try exposures until the brightest part of the window is within the target."""
@@ -68,16 +87,18 @@ class Exposer:
             tried.append(exposure_s)
             self.camera.set_exposure_s(exposure_s)
             frame = self.camera.grab(1)[0]
-            exposure_s = self._suiting_s(step, frame, window)
+            exposure_s = self._suiting_s(frame, window)
             if exposure_s in tried or len(tried) == MAX_EXPOSURES_TRIED:
                 return frame
 
     def _first_guess_s(self, step: Step) -> float:
-        """From the brightness of this surface's last picture, or the plan's guess."""
-        rate = self._rate_dn_per_s.get(step.surface)
-        return step.expected_exposure_s if rate is None else self._within_target_s(rate)
+        """From the brightness of this surface's last reading, or the plan's guess."""
+        last = self._last.get(step.surface)
+        if last is None or math.isnan(last.peak_dn):
+            return step.expected_exposure_s
+        return self._within_target_s(self._rate(last.peak_dn, last.exposure_s))
 
-    def _suiting_s(self, step: Step, frame: Frame, window: Window) -> float:
+    def _suiting_s(self, frame: Frame, window: Window) -> float:
         """The exposure that this frame's brightness asks for."""
         counted = frame.image[window.crop][window.counted]
         if not counted.size:
@@ -85,9 +106,11 @@ class Exposer:
         camera, peak = self.rig.camera, bright_level(counted)
         if peak >= NEARLY_FULL * camera.max_dn:  # how far over the top cannot be seen
             return longest_below(frame.exposure_s / 4, camera)
-        rate = max(peak - camera.black_level_dn, 0.5) / frame.exposure_s
-        self._rate_dn_per_s[step.surface] = rate
-        return self._within_target_s(rate)
+        return self._within_target_s(self._rate(peak, frame.exposure_s))
+
+    def _rate(self, peak_dn: float, exposure_s: float) -> float:
+        """Counts per second of the brightest part."""
+        return max(peak_dn - self.rig.camera.black_level_dn, 0.5) / exposure_s
 
     def _within_target_s(self, rate_dn_per_s: float) -> float:
         """The longest exposure of the ladder that keeps such a brightness within the target."""
@@ -96,12 +119,18 @@ class Exposer:
         return longest_below(target / rate_dn_per_s, camera)
 
     def _dark(self, exposure_s: float) -> Dark:
+        """That exposure's dark; one that a resumed scan takes again costs none of its time."""
         if exposure_s not in self._darks:
-            self._take_darks((exposure_s,))
+            begun_s = self.clock.now_s()
+            self.take_darks((exposure_s,))
+            if exposure_s in self._before:
+                self._start_s += self.clock.now_s() - begun_s
         return self._darks[exposure_s]
 
-    def _take_darks(self, exposures_s: Sequence[float]) -> None:
+    def take_darks(self, exposures_s: Sequence[float]) -> None:
         """Darken the lamp, take the dark frames of these exposures, light it again."""
+        if not exposures_s:
+            return
         self.lamp.darken()
         for exposure_s in exposures_s:
             self.camera.set_exposure_s(exposure_s)

@@ -18,7 +18,7 @@ from instrument.devices import Surface
 from instrument.errors import InputError
 from instrument.geometry import camera_to_lamp_deg, cone_half_angle_deg
 from instrument.protocol_config import Protocol, Sweep, angles_deg
-from instrument.record import Kind
+from instrument.reading import Kind
 from instrument.rig_config import Rig
 from instrument.yaml_marks import place
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from acquisition.exposing import Exposed
 from acquisition.window import Window
-from instrument.record import Preview
+from instrument.reading import Preview
 
 
 def preview_of(exposed: Exposed, window: Window, max_dn: int) -> Preview:

@@ -17,7 +17,7 @@ from acquisition.drift import Drift, rate
 from analysis.measurements import SharedError
 from instrument.geometry import FloatArray
 from instrument.protocol_config import Protocol
-from instrument.record import Reading
+from instrument.reading import Check, Reading
 
 NOISE, ROUNDING, DRIFT = "photon and read noise", "rounding to counts", "lamp drift"
 DARK, PLACEMENT, TEXTURE = "dark frames", "sample placement", "texture at the window edge"
@@ -87,10 +87,13 @@ def root_sum_square(parts: Sequence[FloatArray]) -> FloatArray:
     return total
 
 
-def reduce(readings: Sequence[Reading], protocol: Protocol) -> Reduced:
-    """Work out radiance and BRDF of all points of a run."""
+def reduce(
+    readings: Sequence[Reading], protocol: Protocol, checks: Sequence[Check] = ()
+) -> Reduced:
+    """Work out radiance and BRDF of all points of a run; `checks` are those made at a resume."""
     points = tuple(r for r in readings if r.kind == "point")
-    drifts = {block: Drift.of(readings, block) for block in sorted({r.block for r in readings})}
+    blocks = sorted({r.block for r in readings})
+    drifts = {block: Drift.of(readings, block, checks) for block in blocks}
     tiles = {r.lamp_setting: _tile(r, drifts[r.block]) for r in readings if r.kind == "tile"}
     radiance = np.array([rate(p) / drifts[p.block].at(p.time_s) for p in points])
     tile = protocol.references.white_tile
@@ -106,7 +109,7 @@ def reduce(readings: Sequence[Reading], protocol: Protocol) -> Reduced:
         _shared_by_tile(points, own, protocol),
         tuple(_flags(p, t, tile is not None) for p, t in zip(points, own, strict=True)),
         tuple(drift.level for drift in drifts.values()),
-        sum(r.kind == "drift" for r in readings),
+        sum(r.kind == "drift" for r in readings) + sum(check.jumped for check in checks),
     )
 
 

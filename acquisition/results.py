@@ -42,7 +42,7 @@ class Outcome:
 
 def finish(record: Record, loaded: Loaded) -> Outcome:
     """Reduce, fit and report; each file in the run's folder is written whole or not at all."""
-    reduced = reduce(record.readings(), loaded.protocol)
+    reduced = reduce(record.readings(), loaded.protocol, record.checks())
     if not reduced.points:
         raise NotDetermined(
             f"{record.folder}: no geometry has been measured yet: gonio resume {record.folder}"

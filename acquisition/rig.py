@@ -51,14 +51,13 @@ def see_emulated_camera(rig: Rig) -> None:
         restart_with_camera()
 
 
-def open_devices(loaded: Loaded, elapsed_s: float = 0.0) -> Devices:
+def open_devices(loaded: Loaded) -> Devices:
     """Open every device of the rig file, and close them all again if one cannot be opened.
 
-    A scene that is simulated answers the operator's prompts. `elapsed_s` is the time that the scan
-    has taken already: the simulated lamp has aged by it.
+    A scene that is simulated answers the operator's prompts.
     """
     with ExitStack() as opening:
-        bench = opening.enter_context(Bench(loaded, elapsed_s))
+        bench = opening.enter_context(Bench(loaded))
         axes = {name: bench.axis(name) for name in AXES}
         camera, step = bench.camera(), bench.begin_step
         devices = Devices(axes, camera, bench.lamp, bench.operator, bench.clock, step)
@@ -68,16 +67,16 @@ def open_devices(loaded: Loaded, elapsed_s: float = 0.0) -> Devices:
 class Bench(Closing):
     """What a rig file describes; each device is opened when it is asked for. Use it with `with`."""
 
-    def __init__(self, loaded: Loaded, elapsed_s: float = 0.0) -> None:
+    def __init__(self, loaded: Loaded) -> None:
         from drivers.opening import Lines
 
         self._rig, self._closing = loaded.rig, ExitStack()
         self._scene = None if self._rig.real else _scene(loaded)
-        self.clock: Clock = SimulatedClock(elapsed_s) if self._rig.simulated else SystemClock()
+        self.clock: Clock = SimulatedClock() if self._rig.simulated else SystemClock()
         self.operator = self._operator()
         self.lamp = self._lamp()
         self._lines = self._closing.enter_context(Lines(self.clock))
-        self._emulated = self._emulate(elapsed_s) if self._rig.emulated else None
+        self._emulated = self._emulate() if self._rig.emulated else None
 
     def close(self) -> None:
         """Let go of all of it; safe twice."""
@@ -104,10 +103,10 @@ class Bench(Closing):
         self._closing.callback(camera.close)
         return camera
 
-    def begin_step(self, step: int) -> None:
-        """Tell a simulated scene which step comes next; a real bench need not know."""
+    def begin_step(self, step: int, planned_s: float) -> None:
+        """Tell a simulated scene which step comes next, and when; a real bench need not know."""
         if self._scene is not None:
-            self._scene.begin_step(step)
+            self._scene.begin_step(step, planned_s)
 
     def stand_at(self, theta_r_deg: float) -> None:
         """Have a simulated scene stand so that something is to be seen; nothing real moves."""
@@ -145,10 +144,10 @@ class Bench(Closing):
             return HandCoveredLamp(self.operator)
         return SimulatedShutter(self._scene, self.clock)
 
-    def _emulate(self, elapsed_s: float) -> EmulatedBench:
+    def _emulate(self) -> EmulatedBench:
         from sim.emulated import EmulatedBench
 
-        emulated = EmulatedBench(self._simulated(), self.clock, elapsed_s)
+        emulated = EmulatedBench(self._simulated(), self.clock)
         self._closing.callback(emulated.close)
         return emulated
 

@@ -12,21 +12,17 @@ from importlib.metadata import version
 from pathlib import Path
 
 from acquisition.afterwards import Afterwards
-from acquisition.console import (
-    console,
-    duration_text,
-    print_outcome,
-    print_plan,
-    progress,
-)
-from acquisition.engine import Devices, Engine
+from acquisition.console import print_outcome, print_plan
+from acquisition.going_on import SoFar
+from acquisition.kept_frames import require_room
 from acquisition.models import check_model
 from acquisition.motion import home_pose, moves_between
 from acquisition.plan import Plan, make_plan
-from acquisition.rig import open_devices, prepare
+from acquisition.rig import prepare
+from acquisition.scan import scan
 from acquisition.terminal import require_yes
 from instrument.config import Loaded, load_protocol
-from instrument.errors import DeviceError, InputError, OperatorStop
+from instrument.errors import InputError
 from instrument.files import write_whole
 from instrument.record import Record
 
@@ -41,26 +37,28 @@ def run_protocol(
     plan = make_plan(loaded)
     prepare(loaded)
     folder = out if out is not None else _default_folder(loaded)
-    with Record.create(folder, _meta(loaded, plan)) as record:
-        write_whole(folder / PROTOCOL_FILE, loaded.protocol_text)
-        write_whole(folder / RIG_FILE, loaded.rig_text)
+    require_room(plan, loaded, folder)
+    with Record.create(folder, _meta(loaded, plan)) as record, record.claimed():
+        _write_inputs(record)
         with Afterwards(folder, as_json) as afterwards:
-            _scan(loaded, plan, record)
+            scan(loaded, plan, record)
             afterwards.finish()
 
 
 def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
     """Go on with a stopped run; a finished one is fitted and reported again."""
     with Record.open(folder) as record:
+        _write_inputs(record)
         loaded = as_used(record)
         plan = make_plan(loaded)
-        done = frozenset(reading.step for reading in record.readings())
-        missing = [step for step in plan.steps if step.index not in done]
+        so_far = SoFar(tuple(record.readings()), tuple(record.checks()))
+        missing = so_far.missing(plan)
         if missing:
             moves_between(home_pose(loaded.rig), missing[0].pose, loaded.rig)  # or nothing moves
             prepare(loaded)
-            _confirm(yes, len(missing))
-            _scan(loaded, plan, record, done)
+            with record.claimed():
+                _confirm(yes, len(missing), record)
+                scan(loaded, plan, record, so_far)
         _finish(record, loaded, as_json)
 
 
@@ -89,55 +87,6 @@ def _plan_json(plan: Plan) -> dict[str, object]:
         "hand_settings": plan.hand_settings,
         "steps": [asdict(step) | {"pose": step.pose._asdict()} for step in plan.steps],
     }
-
-
-def _scan(loaded: Loaded, plan: Plan, record: Record, done: frozenset[int] = frozenset()) -> None:
-    """Run the plan; whatever ends it early is in the record and in the message."""
-    elapsed_s = max((reading.time_s for reading in record.readings()), default=0.0)
-    devices = open_devices(loaded, elapsed_s)
-    try:
-        _drive(loaded, plan, record, done, elapsed_s, devices)
-    finally:
-        devices.close()
-
-
-def _drive(
-    loaded: Loaded,
-    plan: Plan,
-    record: Record,
-    done: frozenset[int],
-    elapsed_s: float,
-    devices: Devices,
-) -> None:
-    begun_s = devices.clock.now_s() - elapsed_s
-    console.print(
-        f"{loaded.protocol.name}: {len(plan.points)} geometries, about "
-        f"{duration_text(plan.duration_s)} on the rig ({loaded.rig.name}), into {record.folder}",
-        highlight=False,
-        soft_wrap=True,
-    )
-    clock = devices.clock
-    try:
-        with record.claimed(), progress(plan, done) as on_step:
-            engine = Engine(loaded.protocol, loaded.rig, devices, record, on_step)
-            engine.run(plan, done, elapsed_s)
-    except (KeyboardInterrupt, OperatorStop) as stop:
-        why = str(stop) or "stopped by the operator"
-        record.add_event(clock.utc().isoformat(), "stopped", why)
-        raise OperatorStop(f"{why}: all motion has ended. {_go_on(record)}") from None
-    except DeviceError as error:
-        record.add_event(clock.utc().isoformat(), "fault", str(error))
-        raise DeviceError(f"{error}\n{_go_on(record)}") from error
-    record.add_event(clock.utc().isoformat(), "finished", f"{len(plan.steps)} steps")
-    record.set_meta("scan_s", f"{clock.now_s() - begun_s:.1f}")
-    record.set_meta("finished_utc", clock.utc().isoformat(timespec="seconds"))
-
-
-def _go_on(record: Record) -> str:
-    return (
-        f"{len(record.readings())} readings are safe in {record.folder}. Go on with: "
-        f"gonio resume {record.folder}"
-    )
 
 
 def _finish(record: Record, loaded: Loaded, as_json: bool) -> None:
@@ -189,11 +138,23 @@ def as_used(record: Record) -> Loaded:
     return loaded
 
 
-def _confirm(yes: bool, steps: int) -> None:
-    """Nothing moves again until the operator has said so."""
+def _write_inputs(record: Record) -> None:
+    """The run's own copies of protocol and rig; a process may have died before it wrote them."""
+    for key, name in (("protocol", PROTOCOL_FILE), ("rig", RIG_FILE)):
+        text = record.meta(key)
+        if text is not None and not (record.folder / name).exists():
+            write_whole(record.folder / name, text)
+
+
+def _confirm(yes: bool, steps: int, record: Record) -> None:
+    """Nothing moves again until the operator has said so; who said it is in the record."""
+    ends = [(kind, why) for _, kind, why in record.events() if kind in ("fault", "stopped")]
     if not yes:
+        last = f"The scan ended with: {ends[-1][1]}\n" if ends else ""
         require_yes(
-            f"{steps} readings are missing. Is the rig clear, may the stage move?",
+            f"{last}{steps} readings are missing. Is the rig clear, may the stage move?",
             "gonio resume: nobody to ask whether the rig may move: add --yes",
             "not resumed: nothing has moved",
         )
+    how = "--yes" if yes else "yes, asked at the terminal"
+    record.add_event(datetime.now(UTC).isoformat(), "resumed", f"the rig may move: {how}")

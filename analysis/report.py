@@ -16,7 +16,7 @@ from analysis import charts
 from analysis.report_data import Candidate, Parameter, ReportData, Rows, Sweep, sweeps_of
 from analysis.report_style import CSS, format_value
 from instrument.files import write_whole
-from instrument.record import Preview
+from instrument.reading import Preview
 
 _STATES = {
     "adequate": ("adequate", "✔ Adequate: the model explains the data"),

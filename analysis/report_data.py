@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instrument.geometry import FloatArray
-from instrument.record import Preview
+from instrument.reading import Preview
 
 BoolArray = NDArray[np.bool_]
 Rows = tuple[tuple[str, str], ...]

@@ -26,6 +26,14 @@ class HandSetAxis:
     def home(self) -> None:
         """Nothing to find: the operator reads the scale."""
 
+    def homed(self) -> bool:
+        """A scale has no reference to lose."""
+        return True
+
+    def settings(self) -> dict[str, str]:
+        """How exactly it is set."""
+        return {"tolerance_deg": f"{self._tolerance_deg:g}"}
+
     def start_move(self, angle_deg: float) -> None:
         """Ask for the angle until the operator says that it is set, or stops."""
         text = f"Set {self._words} ({self._name}) to {angle_deg:g} degrees"

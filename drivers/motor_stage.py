@@ -97,7 +97,20 @@ class MotorStage(ABC):
     def _send_stop(self) -> None:
         """End all motion, before whatever waits for the line."""
 
+    def _own_settings(self) -> dict[str, str]:
+        """What the controller says that it is set to, beside its limits."""
+        return {}
+
     # What the program asks for.
+
+    def homed(self) -> bool:
+        """Whether the controller knows its reference."""
+        return self.status().homed
+
+    def settings(self) -> dict[str, str]:
+        """The limits that hold, and what the controller says that it is set to."""
+        low, high = self.limits_deg()
+        return {"limits_deg": f"{low:g} to {high:g}", **self._own_settings()}
 
     def limits_deg(self) -> tuple[float, float]:
         """The narrower of the rig file's limits and the controller's."""

@@ -138,6 +138,11 @@ class NewportStage(MotorStage):
     def _own_limits_deg(self) -> tuple[float, float]:
         return self._range
 
+    def _own_settings(self) -> dict[str, str]:
+        asked = {"speed_deg_per_s": "VA", "acceleration_deg_per_s2": "AC"}
+        found = {n: self._port.ask(way, self._number(way), "?") for n, way in asked.items()}
+        return {name: f"{value:g}" for name, value in found.items()}
+
     def _send_home(self) -> None:
         self._port.tell("OR")
 

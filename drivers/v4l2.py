@@ -70,6 +70,12 @@ class V4l2Camera(Closing):
         who = f"{found.card} ({found.driver}, {found.bus})" if found else s.device
         return "; ".join([f"{who}, {picture}", *self._remarks()])
 
+    def settings(self) -> dict[str, str]:
+        """The picture's form, and every control as it was read back."""
+        s = self._settings
+        size = {"size_px": f"{s.width_px} x {s.height_px}", "bit_depth": str(s.bit_depth)}
+        return {"pixel_format": s.pixel_format, **size, **self._opened().settings}
+
     def _remarks(self) -> list[str]:
         traits = self._traits
         if traits is None:

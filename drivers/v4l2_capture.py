@@ -94,6 +94,11 @@ class Capture:
         self._buffers, self._turn = buffer_count(self._video), 0
 
     @property
+    def settings(self) -> dict[str, str]:
+        """Every control that was set, as it was read back."""
+        return dict(self._controls.read_back)
+
+    @property
     def sees_buffers(self) -> bool:
         """Whether the descriptor that OpenCV streams on was found."""
         return self._stream is not None

@@ -39,6 +39,8 @@ class Controls:
 
     def __init__(self, descriptor: int, who: str) -> None:
         self._descriptor, self._who = descriptor, who
+        self.read_back: dict[str, str] = {}
+        """What was set, as the camera then said it was."""
 
     def leave_nothing_automatic(self) -> list[str]:
         """Switch off what would change counts by itself, where there is such a thing.
@@ -96,6 +98,7 @@ class Controls:
                 f"{asked}, the camera took {wish.text(found)}; it says that it allows "
                 f"{_range(one, wish)}; ask for what the camera can do"
             )
+        self.read_back[wish.words] = wish.text(found)
         return found
 
     def _check_presence(self) -> None:

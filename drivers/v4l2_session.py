@@ -55,6 +55,11 @@ class Session:
         return self._capture.capability
 
     @property
+    def settings(self) -> dict[str, str]:
+        """What the camera says that it is set to, and how often it takes a frame."""
+        return {**self._capture.settings, "frame period": f"{self.traits.period_s:g} s"}
+
+    @property
     def exposure_s(self) -> float:
         """The exposure that was read back last."""
         return self._steps / STEPS_PER_S

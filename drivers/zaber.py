@@ -126,6 +126,10 @@ class ZaberStage(MotorStage):
     def _own_limits_deg(self) -> tuple[float, float]:
         return self._range
 
+    def _own_settings(self) -> dict[str, str]:
+        rate = self._whole("maxspeed") / framing.SPEED_PER_MICROSTEP
+        return {"speed_deg_per_s": f"{rate / self._steps_per_deg:g}"}
+
     def _send_home(self) -> None:
         self._sent(lambda: self._port.tell("home"))
 

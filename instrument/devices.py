@@ -59,6 +59,14 @@ class Stage(Protocol):
         """Find the reference; no motion is allowed before."""
         ...
 
+    def homed(self) -> bool:
+        """Whether it knows its reference; an axis that is set by hand always does."""
+        ...
+
+    def settings(self) -> dict[str, str]:
+        """What it is set to, read back from it where it tells; units in the names."""
+        ...
+
     def start_move(self, angle_deg: float) -> None:
         """Begin to move to `angle_deg`; returns at once."""
         ...
@@ -89,6 +97,10 @@ class Camera(Protocol):
 
     def identity(self) -> str:
         """Who answers: maker, model, serial number."""
+        ...
+
+    def settings(self) -> dict[str, str]:
+        """What it is set to, read back from it where it tells; units in the names."""
         ...
 
     def set_exposure_s(self, exposure_s: float) -> float:

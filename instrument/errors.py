@@ -31,6 +31,12 @@ class DeviceError(GonioError):
     exit_code = 3
 
 
+class StorageError(GonioError):
+    """The disk does not take what has to be kept: the message says which file and why."""
+
+    exit_code = 3
+
+
 class OperatorStop(GonioError):
     """The operator stopped the scan (Ctrl-C, or a refused prompt)."""
 

@@ -149,6 +149,7 @@ class Protocol(Section):
     frames_per_point: Annotated[int, Field(ge=1, le=10_000)] = 4
     dark_frames: Annotated[int, Field(ge=1, le=10_000)] = 8
     exposure_target: Annotated[float, Field(gt=0, lt=1)] = 0.7
+    keep_frames: bool = False
     references: References = References()
     fit: Fit = Fit()
     simulated_sample: SimulatedSample | None = None

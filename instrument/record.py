@@ -1,8 +1,8 @@
 """The run record: one SQLite file a run, where acquiring and analysing meet.
 
-Write-ahead log and `synchronous=FULL`: what has been committed survives the process. Any SQLite
-tool can read it while the scan runs. Counts (DN) are stored as measured; radiance and BRDF are
-worked out from them afterwards, so nothing that a value came from is lost.
+Write-ahead log and `synchronous=FULL`: what has been committed survives the process and the power.
+Any SQLite tool can read it while the scan runs. Counts (DN) are stored as measured; radiance and
+BRDF are worked out from them afterwards, so nothing that a value came from is lost.
 """
 
 from __future__ import annotations
@@ -11,91 +11,24 @@ import fcntl
 import json
 import math
 import os
+import shutil
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from instrument.closing import Closing
-from instrument.devices import Frame, Surface
-from instrument.errors import InputError
+from instrument.devices import Frame
+from instrument.errors import InputError, StorageError
+from instrument.files import make_folder, sync_folder
 from instrument.mounts import network_share
+from instrument.reading import Check, Preview, Reading
+from instrument.record_schema import MARKS, SCHEMA_VERSION, begin, connect
 
-SCHEMA_VERSION = 2
 FILE_NAME = "record.sqlite"
 LOCK_NAME = ".scanning"
-
-Kind = Literal["point", "tile", "drift"]
-
-_TABLES = """
-CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
-CREATE TABLE device (role TEXT PRIMARY KEY, identity TEXT NOT NULL);
-CREATE TABLE event (id INTEGER PRIMARY KEY, time_utc TEXT NOT NULL, kind TEXT NOT NULL,
-                    text TEXT NOT NULL);
-CREATE TABLE dark (id INTEGER PRIMARY KEY, time_utc TEXT NOT NULL, exposure_s REAL NOT NULL,
-                   frames INTEGER NOT NULL, mean_dn REAL NOT NULL, noise_dn REAL NOT NULL);
-CREATE TABLE frame (step INTEGER NOT NULL, number INTEGER NOT NULL, exposure_s REAL NOT NULL,
-                    time_s REAL NOT NULL, device_time_s REAL, PRIMARY KEY (step, number));
-CREATE TABLE preview (step INTEGER PRIMARY KEY, caption TEXT NOT NULL, png BLOB NOT NULL,
-                      polygon TEXT NOT NULL);
-"""
-
-
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """One measured geometry, in counts: the mean of the window, its uncertainties, its flags.
-
-    `step` is its number in the plan. Angles in degrees, theta_r signed. `signal_dn` is the
-    area-weighted mean of the window over all frames less the dark, cos^4 divided out; the u are
-    standard uncertainties of it: `u_noise_dn` of photons and read-out, `u_quantisation_dn` of
-    rounding the frames to whole counts, `u_dark_dn` of the dark (the same for all readings
-    of one exposure), `u_placement_dn` of how well the sample stands on the axis (signed:
-    one placement shifts all its readings together) and `u_texture_dn` of what that leaves out.
-    `lamp_setting` numbers the places of the lamp, `block` the times it was set by hand.
-    """
-
-    step: int
-    kind: Kind
-    surface: Surface
-    theta_i_deg: float
-    dphi_deg: float
-    theta_r_deg: float
-    lamp_setting: int
-    block: int
-    signal_dn: float
-    u_noise_dn: float
-    u_quantisation_dn: float
-    u_dark_dn: float
-    u_placement_dn: float
-    u_texture_dn: float
-    exposure_s: float
-    frames: int
-    window_pixels: float
-    saturated_pixels: int
-    peak_dn: float
-    time_s: float
-    time_utc: str
-    flags: str
-
-
-@dataclass(frozen=True, slots=True)
-class Preview:
-    """A small picture for the report with the window's outline, (N, 2) as (column, row)."""
-
-    step: int
-    caption: str
-    png: bytes
-    polygon: list[list[float]]
-
-
-_SQL_TYPE = {"int": "INTEGER", "float": "REAL"}
-_READING_COLUMNS = ", ".join(
-    f"{f.name} {_SQL_TYPE.get(str(f.type), 'TEXT')}"
-    + (" PRIMARY KEY" if f.name == "step" else "" if f.type == "float" else " NOT NULL")
-    for f in fields(Reading)
-)
 
 
 class Record(Closing):
@@ -104,6 +37,7 @@ class Record(Closing):
     def __init__(self, connection: sqlite3.Connection, folder: Path) -> None:
         self._db = connection
         self.folder = folder
+        self._file = (folder / FILE_NAME).stat()
 
     @classmethod
     def create(cls, folder: Path, meta: Mapping[str, str]) -> Record:
@@ -115,14 +49,12 @@ class Record(Closing):
                     f"{folder}: --out must be absent or an empty folder: name another, or leave "
                     "it out"
                 )
-            folder.mkdir(parents=True, exist_ok=True)
-            database = _connect(folder / FILE_NAME)
+            make_folder(folder)
+            database = connect(folder / FILE_NAME)
+            begin(database, meta)
+            sync_folder(folder)
         except (OSError, sqlite3.Error) as error:
             raise InputError(f"{folder}: cannot write the run there: {error}") from error
-        with database:
-            database.executescript(_TABLES + f"CREATE TABLE reading ({_READING_COLUMNS});")
-            rows = {"schema_version": str(SCHEMA_VERSION), **meta}
-            database.executemany("INSERT INTO meta VALUES (?, ?)", rows.items())
         return cls(database, folder)
 
     @classmethod
@@ -133,8 +65,8 @@ class Record(Closing):
         if not path.is_file():
             raise InputError(f"{folder}: no {FILE_NAME} there: name the folder of a run")
         try:
-            record = cls(_connect(path), folder)
-            version = record.meta("schema_version")
+            record = cls(connect(path), folder)
+            version = record._begun_with()
         except sqlite3.Error as error:
             raise InputError(f"{path}: not a record of this program: {error}") from error
         if version != str(SCHEMA_VERSION):
@@ -168,6 +100,11 @@ class Record(Closing):
         """Close the file; safe twice."""
         self._db.close()
 
+    def where(self) -> Path:
+        """The folder in which the record's file is now, should it have been moved."""
+        found = _path_of(self._file)
+        return found.parent if found is not None and found.is_file() else self.folder
+
     def meta(self, key: str) -> str | None:
         """One entry of the run's description."""
         row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
@@ -175,50 +112,84 @@ class Record(Closing):
 
     def set_meta(self, key: str, value: str) -> None:
         """Set one entry of the run's description."""
-        with self._db:
-            self._db.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, value))
+        self._write("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, value))
 
     def add_device(self, role: str, identity: str) -> None:
         """Write down which device answered."""
-        with self._db:
-            self._db.execute("INSERT OR REPLACE INTO device VALUES (?, ?)", (role, identity))
+        self._write("INSERT OR REPLACE INTO device VALUES (?, ?)", (role, identity))
+
+    def add_settings(self, time_utc: str, role: str, settings: Mapping[str, str]) -> None:
+        """Write down what a device says that it is set to."""
+        with self._writing() as database:
+            rows = [(time_utc, role, *setting) for setting in settings.items()]
+            database.executemany("INSERT INTO setting VALUES (NULL, ?, ?, ?, ?)", rows)
 
     def add_event(self, time_utc: str, kind: str, text: str) -> None:
-        """Write down what happened: a prompt and its answer, a stop, a fault, the end."""
-        with self._db:
-            self._db.execute("INSERT INTO event VALUES (NULL, ?, ?, ?)", (time_utc, kind, text))
+        """Write down what happened: a prompt and its answer, a stop, a retry, a fault, the end."""
+        self._write("INSERT INTO event VALUES (NULL, ?, ?, ?)", (time_utc, kind, text))
 
     def add_dark(
         self, time_utc: str, exposure_s: float, frames: int, mean_dn: float, noise_dn: float
     ) -> None:
         """Write down a dark: mean count and temporal noise of one pixel."""
         row = (time_utc, exposure_s, frames, mean_dn, noise_dn)
-        with self._db:
-            self._db.execute("INSERT INTO dark VALUES (NULL, ?, ?, ?, ?, ?)", row)
+        self._write("INSERT INTO dark VALUES (NULL, ?, ?, ?, ?, ?)", row)
 
     def add_reading(
-        self, reading: Reading, preview: Preview | None = None, frames: Sequence[Frame] = ()
+        self,
+        reading: Reading,
+        preview: Preview | None = None,
+        frames: Sequence[Frame] = (),
+        files: Sequence[str] = (),
     ) -> None:
         """Accept a measured geometry in one transaction: its picture if one is kept, its frames.
 
-        Of a frame are kept its exposure, when it was read, and the camera's own time stamp.
+        Of a frame are kept its exposure, when it was read, the camera's own time stamp, and the
+        file in the run's folder that holds it, if one does.
         """
-        marks = ", ".join("?" * len(fields(Reading)))
+        names: Sequence[str | None] = files or [None] * len(frames)
         rows = [
-            (reading.step, number, frame.exposure_s, frame.time_s, frame.device_time_s)
-            for number, frame in enumerate(frames)
+            (reading.step, number, frame.exposure_s, frame.time_s, frame.device_time_s, name)
+            for number, (frame, name) in enumerate(zip(frames, names, strict=True))
         ]
-        with self._db:
-            self._db.executemany("INSERT INTO frame VALUES (?, ?, ?, ?, ?)", rows)
-            self._db.execute(f"INSERT INTO reading VALUES ({marks})", astuple(reading))
+        with self._writing() as database:
+            database.executemany("INSERT INTO frame VALUES (?, ?, ?, ?, ?, ?)", rows)
+            database.execute(f"INSERT INTO reading VALUES ({MARKS})", astuple(reading))
             if preview is not None:
                 row = (preview.step, preview.caption, preview.png, json.dumps(preview.polygon))
-                self._db.execute("INSERT INTO preview VALUES (?, ?, ?, ?)", row)
+                database.execute("INSERT INTO preview VALUES (?, ?, ?, ?)", row)
+
+    def add_check(self, check: Check) -> None:
+        """Write down the drift reference as it was found when the scan went on."""
+        head = (check.before_step, check.expected, check.u_expected, check.jumped)
+        row = (*head, *astuple(check.reading))
+        self._write(f"INSERT INTO drift_at_resume VALUES (?, ?, ?, ?, {MARKS})", row)
 
     def readings(self) -> list[Reading]:
         """All measured geometries in the plan's order."""
         rows = self._db.execute("SELECT * FROM reading ORDER BY step").fetchall()
         return [Reading(*_with_nan(row)) for row in rows]
+
+    def checks(self) -> list[Check]:
+        """The drift references that were measured when the scan went on, in order."""
+        rows = self._db.execute("SELECT * FROM drift_at_resume ORDER BY rowid").fetchall()
+        return [
+            Check(a, b, u, bool(jumped), Reading(*_with_nan(tuple(row))))
+            for a, b, u, jumped, *row in rows
+        ]
+
+    def settings(self) -> dict[str, dict[str, str]]:
+        """What each device said last that it is set to, by its role."""
+        found: dict[str, dict[str, str]] = {}
+        rows = self._db.execute("SELECT role, name, value FROM setting ORDER BY id")
+        for role, name, value in rows:
+            found.setdefault(role, {})[name] = value
+        return found
+
+    def frame_files(self) -> list[str]:
+        """The files of all kept frames, relative to the run's folder."""
+        sql = "SELECT file FROM frame WHERE file IS NOT NULL ORDER BY step, number"
+        return [name for (name,) in self._db.execute(sql)]
 
     def previews(self) -> list[Preview]:
         """All kept pictures in the plan's order."""
@@ -238,6 +209,77 @@ class Record(Closing):
         """Time, kind and text of every event in order."""
         yield from self._db.execute("SELECT time_utc, kind, text FROM event ORDER BY id")
 
+    def _begun_with(self) -> str | None:
+        """The schema's version; `InputError` where the process died before it had begun."""
+        if self._db.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,):
+            self.close()
+            raise InputError(
+                f"{self.folder}: stopped before the record had begun, so nothing was measured: "
+                "remove the folder and run again"
+            )
+        return self.meta("schema_version")
+
+    def _write(self, sql: str, row: Sequence[object]) -> None:
+        with self._writing() as database:
+            database.execute(sql, row)
+
+    @contextmanager
+    def _writing(self) -> Iterator[sqlite3.Connection]:
+        """One transaction, whole or not at all; `StorageError` where the disk does not take it."""
+        self._require_same_file()
+        try:
+            with self._db:
+                yield self._db
+        except sqlite3.IntegrityError:
+            raise  # the program's mistake and not the disk's
+        except sqlite3.Error as error:
+            path = self.folder / FILE_NAME
+            raise StorageError(f"{path}: {_trouble(error, self.folder)}") from error
+
+    def _require_same_file(self) -> None:
+        """What is written must be found again: a moved or removed file takes nothing more."""
+        path = self.folder / FILE_NAME
+        try:
+            same = _same(path.stat(), self._file)
+        except OSError:
+            same = False
+        if not same:
+            raise StorageError(f"{path}: {_fate(self._file)}")
+
+
+def _same(one: os.stat_result, other: os.stat_result) -> bool:
+    return (one.st_dev, one.st_ino) == (other.st_dev, other.st_ino)
+
+
+def _path_of(file: os.stat_result) -> Path | None:
+    """The path that a file which we have open has now; one that names no file was removed."""
+    for link in Path("/proc/self/fd").iterdir():
+        try:
+            if _same(link.stat(), file):
+                return link.readlink()
+        except OSError:
+            continue  # closed meanwhile: the folder's own listing
+    return None
+
+
+def _fate(file: os.stat_result) -> str:
+    """What became of the record's file, which is no longer where it was."""
+    now = _path_of(file)
+    if now is None or not now.is_file():
+        return "was removed while the scan ran, and the readings with it: run again"
+    return "was moved while the scan ran: nothing accepted is lost"
+
+
+def _trouble(error: sqlite3.Error, folder: Path) -> str:
+    """What SQLite met, in words, and what to do about it."""
+    name = getattr(error, "sqlite_errorname", "")
+    if name == "SQLITE_FULL":
+        free_mb = shutil.disk_usage(folder).free / 1e6
+        return f"the disk is full ({free_mb:.1f} MB free): make room on it"
+    if name.startswith(("SQLITE_READONLY", "SQLITE_PERM", "SQLITE_CANTOPEN")):
+        return f"cannot be written ({error}): look at the folder's permissions and its disk"
+    return f"cannot be written ({error}): look at the disk"
+
 
 def _refuse_network_share(folder: Path) -> None:
     share = network_share(folder)
@@ -251,14 +293,3 @@ def _refuse_network_share(folder: Path) -> None:
 def _with_nan(row: tuple[Any, ...]) -> tuple[Any, ...]:
     """SQLite keeps no nan: it stores NULL."""
     return tuple(math.nan if value is None else value for value in row)
-
-
-def _connect(path: Path) -> sqlite3.Connection:
-    database = sqlite3.connect(path)
-    try:
-        database.execute("PRAGMA journal_mode=WAL")
-        database.execute("PRAGMA synchronous=FULL")
-    except sqlite3.Error:
-        database.close()
-        raise
-    return database

@@ -22,6 +22,11 @@ class SimulatedCamera:
         s = self._settings
         return f"simulated camera, {s.width_px} x {s.height_px} pixels, {s.bit_depth} bit"
 
+    def settings(self) -> dict[str, str]:
+        """What it keeps to."""
+        s = self._settings
+        return {"size_px": f"{s.width_px} x {s.height_px}", "bit_depth": str(s.bit_depth)}
+
     def set_exposure_s(self, exposure_s: float) -> float:
         """Set the exposure in seconds; outside the camera's range it is refused."""
         low, high = self._settings.min_exposure_s, self._settings.max_exposure_s
@@ -33,17 +38,13 @@ class SimulatedCamera:
         return exposure_s
 
     def grab(self, count: int) -> list[Frame]:
-        """Take `count` frames one after the other in simulated time.
-
-        The lamp's level is that of the first: within one series it drifts by far less than 1e-5.
-        """
-        begun_s = self._clock.now_s()
-        return [self._frame(begun_s) for _ in range(count)]
+        """Take `count` frames one after the other in simulated time."""
+        return [self._frame() for _ in range(count)]
 
     def close(self) -> None:
         """Nothing to let go of."""
 
-    def _frame(self, lamp_s: float) -> Frame:
+    def _frame(self) -> Frame:
         self._clock.sleep(self._exposure_s + self._settings.frame_overhead_s)
-        image = self._sensor.picture(self._exposure_s, lamp_s)
+        image = self._sensor.picture(self._exposure_s)
         return Frame(image, self._exposure_s, self._clock.now_s())

@@ -8,12 +8,12 @@ from datetime import UTC, datetime, timedelta
 class SimulatedClock:
     """A clock that only moves when somebody sleeps."""
 
-    def __init__(self, elapsed_s: float = 0.0) -> None:
-        self._start = datetime.now(UTC) - timedelta(seconds=elapsed_s)
-        self._elapsed_s = elapsed_s
+    def __init__(self) -> None:
+        self._start = datetime.now(UTC)
+        self._elapsed_s = 0.0
 
     def now_s(self) -> float:
-        """Simulated seconds, with those that had elapsed before the clock was made."""
+        """Simulated seconds since the clock was made."""
         return self._elapsed_s
 
     def utc(self) -> datetime:

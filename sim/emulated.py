@@ -60,15 +60,15 @@ class _Seen:
     surface: Surface
     lit: bool
     step: int
+    planned_s: float
     true_deg: Mapping[str, float]
 
 
 class EmulatedBench:
     """The emulated devices over one scene, each plugged in when its driver is about to open it."""
 
-    def __init__(self, scene: Scene, clock: Clock, elapsed_s: float = 0.0) -> None:
+    def __init__(self, scene: Scene, clock: Clock) -> None:
         self._scene, self._clock = scene, clock
-        self._begun_s = clock.now_s() - elapsed_s
         self._motors: dict[str, Motor] = {}
         self._closing = ExitStack()
 
@@ -100,9 +100,10 @@ class EmulatedBench:
         def render(exposure: Exposure, seen: object) -> Image:
             with lock:
                 if isinstance(seen, _Seen):
-                    painted.surface, painted.lit, painted.step = seen.surface, seen.lit, seen.step
+                    painted.surface, painted.lit = seen.surface, seen.lit
+                    painted.begin_step(seen.step, seen.planned_s)
                     painted.true_deg = dict(seen.true_deg)
-                return sensor.picture(exposure.exposure_s, exposure.start_s - self._begun_s)
+                return sensor.picture(exposure.exposure_s)
 
         device = EmulatedCamera(render, self._snapshot, _described(camera))
         self._closing.enter_context(V4l2Server(device, Path(os.environ[_SOCKET])))
@@ -112,7 +113,8 @@ class EmulatedBench:
         scene = self._scene
         for name, motor in self._motors.items():
             scene.set_axis(name, scene.rig.axes[name].from_device_deg(motor.position_deg))
-        return _Seen(scene.surface, scene.lit, scene.step, dict(scene.true_deg))
+        state = (scene.surface, scene.lit, scene.step, scene.planned_s)
+        return _Seen(*state, dict(scene.true_deg))
 
 
 def _controller(axis: Wired, motor: Motor) -> Controller:

@@ -2,8 +2,8 @@
 
 The simulated stages write it, the simulated camera renders it, the simulated operator changes it
 when asked. Everything random is keyed by the rig's seed and by what it belongs to (an axis and an
-angle, a step of the plan and a frame), never by how often something was called: the same protocol
-gives the same bytes.
+angle, a step of the plan and a frame), never by how often something was called, and the lamp ages
+by the plan's time: the same protocol gives the same bytes, in one go or resumed.
 """
 
 from __future__ import annotations
@@ -40,13 +40,17 @@ class Scene:
     surface: Surface = "sample"
     lit: bool = True
     step: int = 0
+    planned_s: float = 0.0
     true_deg: dict[str, float] = field(default_factory=dict)
     rings: dict[tuple[str, float, float], NDArray[np.int64]] = field(default_factory=dict)
     _texture: FloatArray | None = None
 
-    def begin_step(self, step: int) -> None:
-        """From now on the plan's step `step` is measured: its noise is its own."""
-        self.step = step
+    def begin_step(self, step: int, planned_s: float) -> None:
+        """From now on the plan's step `step` is measured: its noise is its own.
+
+        planned_s: the time in the plan at which it is read; the lamp's age, whatever the clock is.
+        """
+        self.step, self.planned_s = step, planned_s
 
     def random(self, *key: int) -> np.random.Generator:
         """A stream of random numbers that belongs to `key` alone."""
@@ -78,9 +82,9 @@ class Scene:
         error = tile.u_reflectance * self.random(key_of("white tile")).standard_normal()
         return float(min(1.0, tile.reflectance + error))
 
-    def lamp_level(self, time_s: float) -> float:
+    def lamp_level(self) -> float:
         """The lamp's output relative to the start of the scan."""
-        return 1.0 + self.rig.simulation.lamp_drift_per_hour * time_s / 3600.0
+        return 1.0 + self.rig.simulation.lamp_drift_per_hour * self.planned_s / 3600.0
 
     def mottling(self) -> tuple[FloatArray, float]:
         """Relative albedo texture of the sample, mean 0, and its grid's spacing in mm."""

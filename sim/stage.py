@@ -32,6 +32,20 @@ class SimulatedStage:
         self._move = self._over(0.0)
         self._write_scene()
 
+    def homed(self) -> bool:
+        """Whether it was homed since it was made."""
+        return self._homed
+
+    def settings(self) -> dict[str, str]:
+        """What it keeps to."""
+        low, high = self.limits_deg()
+        axis = self._axis
+        return {
+            "limits_deg": f"{low:g} to {high:g}",
+            "speed_deg_per_s": f"{axis.speed_deg_per_s:g}",
+            "acceleration_deg_per_s2": f"{axis.acceleration_deg_per_s2:g}",
+        }
+
     def start_move(self, angle_deg: float) -> None:
         """Begin to move; refuses before homing and past the limits of the rig file."""
         if not self._homed:

@@ -17,7 +17,7 @@ from analysis.report import report_html, write_report
 from analysis.report_data import Candidate, Parameter, ReportData, sweeps_of
 from analysis.report_style import format_value
 from instrument.geometry import FloatArray
-from instrument.record import Preview
+from instrument.reading import Preview
 
 HOSTILE = "<script>alert('1')</script>\"&\x00\udc80 $\\frac$"
 NAN = float("nan")

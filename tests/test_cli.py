@@ -145,7 +145,7 @@ def test_a_stopped_scan_says_how_to_go_on_and_goes_on(
 
 def _stop_after_some_readings(protocol: Path, folder: Path, stop: signal.Signals) -> None:
     """Start a slow enough run, wait until readings are on disk, send the signal."""
-    text = protocol.read_text().replace("frames_per_point: 4", "frames_per_point: 200")
+    text = protocol.read_text().replace("frames_per_point: 4", "frames_per_point: 60")
     protocol = folder.with_suffix(".yaml")
     protocol.write_text(text)
     process = subprocess.Popen(

@@ -13,7 +13,7 @@ from conftest import CONFIGS, changed
 
 from acquisition.axis import Axis
 from acquisition.engine import Devices, Engine
-from acquisition.plan import Plan, Step, make_plan
+from acquisition.plan import Plan, make_plan
 from acquisition.reduction import reduce
 from acquisition.rig import open_devices
 from instrument.config import Loaded, load_protocol
@@ -229,15 +229,6 @@ def test_nothing_is_sent_past_a_limit_of_the_rig_file(small: Loaded) -> None:
         axis.start_move(89.0)
 
 
-def test_a_resumed_scan_leaves_out_what_is_done(small: Loaded, record: Record) -> None:
-    plan = make_plan(small)
-    kept: list[Step] = []
-    Engine(small.protocol, small.rig, open_devices(small), record, kept.append).run(
-        plan, done=frozenset(range(7))
-    )
-    assert [s.index for s in kept] == [s.index for s in plan.steps[7:]]
-
-
 def test_the_plan_predicts_how_long_the_scan_takes(small: Loaded, record: Record) -> None:
     devices = open_devices(small)
     plan = run(small, record, devices)
@@ -290,19 +281,6 @@ def test_a_scan_cut_at_any_step_can_be_reduced(small: Loaded, record: Record) ->
         reduced = reduce(readings[:count], small.protocol)
         assert len(reduced.flags) == len(reduced.points)
         assert np.all(np.isfinite(reduced.brdf[reduced.sound]))
-
-
-def test_the_time_goes_on_after_a_resume(small: Loaded, record: Record) -> None:
-    plan = make_plan(small)
-    for first, last in ((0, 8), (8, len(plan.steps))):
-        elapsed_s = max((r.time_s for r in record.readings()), default=0.0)
-        skipped = frozenset(s.index for s in plan.steps if not first <= s.index < last)
-        devices = open_devices(small, elapsed_s)
-        engine = Engine(small.protocol, small.rig, devices, record, [].append)
-        engine.run(plan, skipped, elapsed_s)
-    times = [r.time_s for r in record.readings()]
-    assert times == sorted(times)
-    assert len(set(times)) == len(plan.steps)
 
 
 def test_a_scan_goes_on_with_the_same_devices_only(small: Loaded, record: Record) -> None:

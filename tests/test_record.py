@@ -10,7 +10,8 @@ import pytest
 
 from instrument.errors import InputError
 from instrument.mounts import network_share
-from instrument.record import FILE_NAME, Preview, Reading, Record
+from instrument.reading import Preview, Reading
+from instrument.record import FILE_NAME, Record
 
 
 def reading(step: int = 0, **changes: object) -> Reading:
@@ -20,7 +21,8 @@ def reading(step: int = 0, **changes: object) -> Reading:
         "u_noise_dn": 0.1, "u_quantisation_dn": 0.01, "u_dark_dn": 0.02, "u_placement_dn": -0.4,
         "u_texture_dn": 0.1,
         "exposure_s": 0.032, "frames": 4, "window_pixels": 31000.25, "saturated_pixels": 0,
-        "peak_dn": 2500.0, "time_s": 12.5, "time_utc": "2026-01-01T00:00:00+00:00", "flags": "",
+        "peak_dn": 2500.0, "time_s": 12.5, "free_s": 12.5, "flags": "",
+        "time_utc": "2026-01-01T00:00:00+00:00",
     }  # fmt: skip
     return Reading(**{**values, **changes})  # type: ignore[arg-type]  # a test's shorthand
 
@@ -51,7 +53,7 @@ def test_another_tool_reads_it_while_the_scan_runs(tmp_path: Path) -> None:
         assert other.execute("SELECT theta_r_deg FROM reading").fetchall() == [(-20.0,)]
         assert other.execute("PRAGMA journal_mode").fetchone() == ("wal",)
         other.close()
-        assert record.meta("schema_version") == "2"
+        assert record.meta("schema_version") == "3"
 
 
 def test_a_value_that_could_not_be_measured_stays_unknown(tmp_path: Path) -> None:
@@ -82,7 +84,7 @@ def test_no_record_a_foreign_file_and_another_version_are_named(tmp_path: Path) 
         Record.open(tmp_path)
     with Record.create(tmp_path / "run", {}) as record:
         record.set_meta("schema_version", "99")
-    with pytest.raises(InputError, match="schema version 99; this program reads 2"):
+    with pytest.raises(InputError, match="schema version 99; this program reads 3"):
         Record.open(tmp_path / "run")
 
 

@@ -1,0 +1,86 @@
+"""One scan, from opening the devices to the last reading; what ends it early is written down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+
+from acquisition.console import console, duration_text, progress
+from acquisition.engine import Devices, Engine
+from acquisition.going_on import SoFar
+from acquisition.noted import Noted, noted
+from acquisition.plan import Plan, Step
+from acquisition.rig import open_devices
+from instrument.clock import Clock, SystemClock
+from instrument.config import Loaded
+from instrument.errors import DeviceError, OperatorStop, StorageError
+from instrument.record import Record
+
+
+def scan(loaded: Loaded, plan: Plan, record: Record, so_far: SoFar | None = None) -> None:
+    """Run the plan, or what is missing of it; the caller has claimed the run.
+
+    Raises `OperatorStop`, `DeviceError` or `StorageError` with the command that goes on.
+    """
+    clock: Clock = SystemClock()
+    try:
+        with noted(record) as notes, closing(open_devices(loaded)) as devices:
+            clock = devices.clock
+            try:
+                _drive(loaded, plan, record, so_far, devices, notes)
+            finally:
+                notes.write()
+    except (KeyboardInterrupt, OperatorStop) as stop:
+        why = str(stop) or "stopped by the operator"
+        _write_down(record, clock, "stopped", why)
+        raise OperatorStop(f"{why}: all motion has ended. {_go_on(record)}") from None
+    except (DeviceError, StorageError) as error:
+        _write_down(record, clock, "fault", str(error))
+        raise type(error)(f"{error}\n{_go_on(record)}") from error
+
+
+def _drive(
+    loaded: Loaded,
+    plan: Plan,
+    record: Record,
+    so_far: SoFar | None,
+    devices: Devices,
+    notes: Noted,
+) -> None:
+    clock, before = devices.clock, so_far or SoFar()
+    begun_s = clock.now_s() - before.elapsed_s
+    console.print(
+        f"{loaded.protocol.name}: {len(plan.points)} geometries, about "
+        f"{duration_text(plan.duration_s)} on the rig ({loaded.rig.name}), into {record.folder}",
+        highlight=False,
+        soft_wrap=True,
+    )
+    with progress(plan, before.done) as show:
+        told = _both(show, notes)
+        Engine(loaded.protocol, loaded.rig, devices, record, told).run(plan, so_far)
+    record.add_event(clock.utc().isoformat(), "finished", f"{len(plan.steps)} steps")
+    record.set_meta("scan_s", f"{clock.now_s() - begun_s:.1f}")
+    record.set_meta("finished_utc", clock.utc().isoformat(timespec="seconds"))
+
+
+def _both(show: Callable[[Step], None], notes: Noted) -> Callable[[Step], None]:
+    def on_step(step: Step) -> None:
+        notes.write()
+        show(step)
+
+    return on_step
+
+
+def _write_down(record: Record, clock: Clock, kind: str, why: str) -> None:
+    """Note why a scan ended; where the disk takes nothing more, the message alone has to tell."""
+    try:
+        record.add_event(clock.utc().isoformat(), kind, why)
+    except StorageError:
+        return
+
+
+def _go_on(record: Record) -> str:
+    where = record.where()
+    return (
+        f"{len(record.readings())} readings are safe in {where}. Go on with: gonio resume {where}"
+    )
