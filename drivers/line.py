@@ -15,7 +15,8 @@ from drivers.turns import Turns
 from instrument.closing import Closing
 from instrument.errors import DeviceError
 
-REPLY_S = 0.25  # controllers answer within 10 to 50 ms; a stop waits no longer than this
+REPLY_S = 0.15  # controllers answer within 10 to 50 ms; a stop waits no longer than this, and an
+# answer that was lost is had again before the status of a moving stage is too old
 MOST_BYTES = 1024  # of a line: what is longer is noise
 
 A = TypeVar("A")

@@ -9,6 +9,7 @@ what may safely be sent twice: reads, and a word that ends motion.
 
 from __future__ import annotations
 
+import logging
 import struct
 import termios
 import time
@@ -39,6 +40,8 @@ _DIALOUT = (
     "look at the cable, at who else has the port open, at the parity, and whether you are in the "
     "group that may use it (dialout)"
 )
+
+log = logging.getLogger(__name__)
 _READ, _WRITE_ONE, _WRITE = 3, 6, 16
 _GATEWAY_SILENT = 0x0B
 _MEANINGS = {
@@ -167,9 +170,10 @@ class ModbusUnit:
         for tries_left in reversed(range(TRIES)):
             try:
                 return self._trusted(lambda: self._read(register, count), until)
-            except Lost:
+            except Lost as lost:
                 if not tries_left or time.monotonic() > until:
                     raise
+                log.warning("%s", lost)
         raise NoReply(f"{self._who}: not asked")  # TRIES is not 0
 
     def write(
@@ -205,9 +209,10 @@ class ModbusUnit:
             try:
                 with self._bus.turns.turn(urgent=True):
                     return self._write_one(register, value)
-            except Lost:
+            except Lost as lost:
                 if not tries_left:
                     raise
+                log.warning("%s", lost)
         return None
 
     def _trusted(self, ask: Callable[[], T], until_s: float) -> T:

@@ -6,17 +6,22 @@ a stall and when a stop is sent is written here, once.
 
 from __future__ import annotations
 
+import logging
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+from drivers.watchdog import SILENT_S, Watchdog
 from instrument.clock import Clock
 from instrument.errors import DeviceError
 from instrument.kinematics import Trapezoid
+
+log = logging.getLogger(__name__)
 
 POLL_S = 0.005
 STARTS_WITHIN_S = 0.5  # some controllers still say ready just after the command
 STALLED_S = 1.0  # said to move, but at the same place
 _ROUNDING_DEG = 1e-9
+_UNHEARD = f"no status for {SILENT_S:g} s while it moved, so it was told to stop"
 
 
 class Stopped(DeviceError):
@@ -62,6 +67,7 @@ class MotorStage(ABC):
         self._from_deg = 0.0
         self._started_s = 0.0
         self._stopped = False
+        self._watchdog = Watchdog(name, self._glanced, self._give_up)
 
     # What a driver says: how its controller is asked and told.
 
@@ -70,8 +76,8 @@ class MotorStage(ABC):
         """Who answers: maker, model, serial number."""
 
     @abstractmethod
-    def status(self) -> Status:
-        """Where the stage is and what it does."""
+    def status(self, patient: bool = True) -> Status:
+        """Where the stage is and what it does; not `patient`: no question is asked again."""
 
     @abstractmethod
     def close(self) -> None:
@@ -140,11 +146,19 @@ class MotorStage(ABC):
 
     def _look_for_reference(self, again: bool) -> None:
         self._stopped, self._target_deg = False, None
+        self._watchdog.begin()
+        try:
+            self._watch_homing(again)
+        finally:
+            self._watchdog.end()
+
+    def _watch_homing(self, again: bool) -> None:
         self._send_home()
         self._stop_if_stopped()
         watch = _Homing(self._limits.homing_s, self._clock.now_s(), again)
         while not watch.ended(now := self._looked()):
             if watch.not_begun(self._clock.now_s()):
+                log.warning("%s: stands still: told again to look for its reference", self.name)
                 self._send_home()  # it stands and has no reference: the command never arrived
             wrong = watch.wrong(self._clock.now_s())
             if wrong:
@@ -170,18 +184,30 @@ class MotorStage(ABC):
         self._stopped = False
         self._from_deg, self._target_deg = now.position_deg, angle_deg
         self._started_s = self._clock.now_s()
-        self._send_move(angle_deg)
-        self._stop_if_stopped()
+        self._watchdog.begin()
+        try:
+            self._send_move(angle_deg)
+            self._stop_if_stopped()
+        except BaseException:
+            self._watchdog.end()
+            raise
 
     def wait(self) -> float:
         """Wait until the move has ended; returns where, in degrees, which must be the target."""
         if self._target_deg is None:
             return self.position_deg()
-        watch = _Watch(self._limits, self._from_deg, self._target_deg, self._started_s)
+        try:
+            return self._watch_move(self._target_deg)
+        finally:
+            self._watchdog.end()
+
+    def _watch_move(self, target_deg: float) -> float:
+        watch = _Watch(self._limits, self._from_deg, target_deg, self._started_s)
         while not watch.ended(now := self._looked()):
             time_s = self._clock.now_s()
             if watch.not_begun(time_s):
-                self._send_move(self._target_deg)  # it stands where it was: nothing arrived
+                log.warning("%s: stands still: told again to go to %g deg", self.name, target_deg)
+                self._send_move(target_deg)  # it stands where it was: nothing arrived
                 self._stop_if_stopped()
             wrong = watch.wrong(now, time_s)
             if wrong:
@@ -193,16 +219,41 @@ class MotorStage(ABC):
     def stop(self) -> None:
         """End all motion now; safe at any time, twice, and from another thread."""
         self._stopped = True
+        self._watchdog.end()
         self._send_stop()
 
     def _looked(self) -> Status:
         """The status of a stage that neither has a fault nor was stopped; else `DeviceError`."""
-        now = self.status()
+        try:
+            now = self._watchdog.hear(self.status)
+        except DeviceError as error:
+            if self._watchdog.fired:
+                raise type(error)(f"{error}; {_UNHEARD}") from error
+            raise
+        if self._watchdog.fired:
+            self._target_deg = None
+            raise DeviceError(f"{self.name}: {_UNHEARD}: look at its cable, then home it")
         if self._stopped:
             self._target_deg = None
             raise Stopped(f"{self.name}: stopped at {now.position_deg:g} deg")
         self._refuse_fault(now)
         return now
+
+    def _glanced(self) -> bool:
+        """Whether the controller answers, asked while nobody else asks."""
+        try:
+            self.status(patient=False)
+        except DeviceError as error:
+            log.warning("%s", error)
+            return False
+        return True
+
+    def _give_up(self) -> None:
+        """Stop what moves unheard."""
+        try:
+            self.stop()
+        except DeviceError as error:
+            log.error("%s: %s; the stop failed too: %s", self.name, _UNHEARD, error)
 
     def _arrived(self, now: Status) -> float:
         target, self._target_deg = self._target_deg, None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -12,6 +13,8 @@ from instrument.clock import Clock
 from instrument.errors import DeviceError
 
 BAUDRATE = {"SMC100": 57600, "CONEX-CC": 921600}
+log = logging.getLogger(__name__)
+
 _TRIES = 3
 _QUIET_S = 0.1
 
@@ -35,13 +38,16 @@ class NewportPort:
         """What the controller calls itself."""
         return self._version
 
-    def ask(self, letters: str, read: Callable[[str], T], value: str = "") -> T:
+    def ask(
+        self, letters: str, read: Callable[[str], T], value: str = "", tries: int = _TRIES
+    ) -> T:
         """The answer to a query; a query may be asked again."""
-        for _ in range(_TRIES):
+        for _ in range(tries):
             try:
                 with self.line.turns.turn():
                     return self._ask_once(letters, read, value)
             except (NoReply, Garbled) as error:
+                log.warning("%s", error)
                 last = error
         raise last
 
@@ -55,7 +61,8 @@ class NewportPort:
             self.line.write(framing.command(self.address, letters, value))
             try:
                 letter = self._ask_once("TE", str, "")
-            except (NoReply, Garbled):
+            except (NoReply, Garbled) as error:
+                log.warning("%s; whether it took %s is open", error, letters)
                 return  # reading the error again would find it cleared
         if letter != "@":
             why = framing.ERRORS.get(letter[:1], "an error that this program does not know")
@@ -122,10 +129,11 @@ class NewportStage(MotorStage):
         """Version of the controller, name of the stage."""
         return f"Newport {self._port.version}, stage {self._stage}, address {self._port.address}"
 
-    def status(self) -> Status:
+    def status(self, patient: bool = True) -> Status:
         """Position, state, errors."""
-        state = self._port.ask("TS", lambda text: framing.state(self._who, text))
-        position = self._port.ask("TP", self._number("TP"))
+        tries = _TRIES if patient else 1
+        state = self._port.ask("TS", lambda text: framing.state(self._who, text), tries=tries)
+        position = self._port.ask("TP", self._number("TP"), tries=tries)
         return Status(position, state.moving, state.homed, state.fault)
 
     def close(self) -> None:

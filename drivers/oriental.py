@@ -6,11 +6,13 @@ whether it has taken it.
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from drivers.line import REPLY_S
 from drivers.modbus_bus import Lost, ModbusBus, ModbusUnit, patience
 from drivers.modbus_client import BusSettings
 from drivers.motor_stage import POLL_S, STARTS_WITHIN_S, Limits, MotorStage, Status, Stopped
@@ -39,6 +41,8 @@ from drivers.oriental_framing import (
 from instrument.clock import Clock
 from instrument.errors import DeviceError, InputError
 
+log = logging.getLogger(__name__)
+
 _RESYNC_COUNTS = (6, 8, 10, 12, 14)  # of the direct data; no other request here has these lengths
 
 
@@ -57,7 +61,7 @@ class OrientalSettings:
     parity: Literal["E", "N", "O"] = "E"
     unit: int = 1
     current: int = FULL_CURRENT
-    reply_s: float = 0.25
+    reply_s: float = REPLY_S
 
     def __post_init__(self) -> None:
         if not self.steps_per_deg > 0:
@@ -101,9 +105,9 @@ class OrientalStage(MotorStage):
         """What answers: it has no name or serial number, so the unit tells two drives apart."""
         return f"Oriental Motor AZ drive, by its registers, unit {self._settings.unit}"
 
-    def status(self) -> Status:
+    def status(self, patient: bool = True) -> Status:
         """Where the stage is, by its own feedback, and what its drive says of itself."""
-        until_s = patience()
+        until_s = patience() if patient else time.monotonic()
         output = self._output(until_s)  # before the position: once it stands, that is the last one
         return Status(
             degrees_of(self._feedback(until_s), self._settings.steps_per_deg),
@@ -212,6 +216,7 @@ class OrientalStage(MotorStage):
             try:
                 return self._drive.write(register, values, until_s, self._refuse_stopped)
             except Lost as lost:
+                log.warning("%s", lost)
                 if self._known_taken(taken, lost):
                     return None
                 if last or time.monotonic() > until_s:

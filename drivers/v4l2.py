@@ -7,6 +7,7 @@ all its settings, by the next call.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from typing import TypeVar
@@ -21,6 +22,8 @@ from instrument.clock import Clock
 from instrument.closing import Closing
 from instrument.devices import Frame
 from instrument.errors import DeviceError
+
+log = logging.getLogger(__name__)
 
 __all__ = ["PixelFormat", "V4l2Camera", "V4l2Settings"]
 
@@ -117,6 +120,7 @@ class V4l2Camera(Closing):
             except CameraLost as error:
                 if self._clock.now_s() + pause_s > until_s:
                     raise CameraLost(f"{error} (still so after {_REOPEN_S:g} s)") from error
+                log.warning("%s: looked for again", error)
                 self._clock.sleep(pause_s)
                 pause_s *= 2
         return self._session

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 
 from drivers import v4l2_ioctl as v4l2
@@ -11,6 +12,8 @@ from drivers.v4l2_reader import Life
 from drivers.v4l2_settings import STEPS_PER_S, V4l2Settings
 from instrument.clock import Clock
 from instrument.devices import Frame
+
+log = logging.getLogger(__name__)
 
 MOST_REFUSED = 3  # bad frames in a series
 EXTRA_FRAMES = 2  # dropped beyond the buffers where time stamps are of no use
@@ -95,6 +98,7 @@ class Session:
                 refused += 1
                 if refused > MOST_REFUSED:
                     raise self._capture.torn(fault, refused)
+                log.warning("camera %s: a frame %s: taken anew", self._settings.device, fault)
                 continue
             frames.append(frame)
             refused = 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 
 from drivers import zaber_framing as framing
@@ -12,6 +13,8 @@ from instrument.clock import Clock
 from instrument.errors import DeviceError
 
 BAUDRATE = 115200
+log = logging.getLogger(__name__)
+
 _TRIES = 3
 _QUIET_S = 0.05
 _STOP_ID = framing.IDS - 1  # kept for stops, so that their replies are nobody else's
@@ -28,12 +31,13 @@ class ZaberPort:
         self.line, self.device, self.axis, self.who = line, device, axis, who
         self._next_id = 0
 
-    def ask(self, text: str, axis: int | None = None) -> Reply:
+    def ask(self, text: str, axis: int | None = None, tries: int = _TRIES) -> Reply:
         """The reply to a command that changes nothing; it may be asked again."""
-        for _ in range(_TRIES):
+        for _ in range(tries):
             try:
                 return self.tell(text, axis)
             except (NoReply, Garbled) as error:
+                log.warning("%s", error)
                 last = error
         raise last
 
@@ -88,21 +92,22 @@ class ZaberStage(MotorStage):
         """Device id and serial number."""
         return f"Zaber device {self._device_id}, serial {self._serial}, axis {self._port.axis}"
 
-    def status(self) -> Status:
+    def status(self, patient: bool = True) -> Status:
         """Position, whether busy, and warnings, all in one reply.
 
         That reply shows the most urgent warning only; behind one there may be that it is not homed.
         Whether it takes position and state at one instant is not documented, so the first reply
         that says that the axis stands is asked for again: the position is then one of rest.
         """
-        reply = self._port.ask("get pos")
+        tries = _TRIES if patient else 1
+        reply = self._port.ask("get pos", tries=tries)
         if not (self._rests or reply.busy):
-            reply = self._port.ask("get pos")
+            reply = self._port.ask("get pos", tries=tries)
         self._rests = not reply.busy
         position = self._value(reply, "pos") / self._steps_per_deg
         flags = [reply.warning]
         if reply.warning != framing.NO_WARNING:
-            flags = self._port.ask("warnings").data.split()[1:]
+            flags = self._port.ask("warnings", tries=tries).data.split()[1:]
         return Status(position, reply.busy, framing.homed(flags), framing.fault(flags))
 
     def close(self) -> None:
@@ -153,7 +158,8 @@ class ZaberStage(MotorStage):
         self._rests = False
         try:
             action()
-        except (NoReply, Garbled):
+        except (NoReply, Garbled) as error:
+            log.warning("%s", error)
             return  # taken or not: the stage's own state tells, see MotorStage
 
     def _send_stop(self) -> None:

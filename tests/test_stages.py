@@ -196,7 +196,7 @@ class Parrot:
             "calls itself 'ESP301 Version 3.0.1'; expected: a SMC100",
         ),
         (b"@01 0 OK IDLE -- 0\r\n", "only b'@01 0 OK IDLE -- 0'"),
-        (b"", "no answer within 0.25 s: look at its power and at the cable"),
+        (b"", "no answer within 0.15 s: look at its power and at the cable"),
     ],
 )
 def test_a_wrong_device_is_refused_with_what_it_said(words: bytes, says: str) -> None:
