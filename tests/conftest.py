@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import time
@@ -75,6 +76,19 @@ def remote(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RemoteCamera]:
 
     with child(tmp_path_factory) as one:
         yield one
+
+
+@pytest.fixture(scope="session")
+def recorder(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The environment in which a process's writes are recorded: see `write_recorder.c`."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler: the write recorder cannot be made (Debian: gcc, libc6-dev)")
+    library = tmp_path_factory.mktemp("recorder") / "write_recorder.so"
+    source = Path(__file__).with_name("write_recorder.c")
+    options = ["-O1", "-Wall", "-Werror", "-shared", "-fPIC"]
+    subprocess.run([compiler, *options, "-o", library, source, "-ldl"], check=True, timeout=60)
+    return {"LD_PRELOAD": str(library)}
 
 
 @pytest.fixture
