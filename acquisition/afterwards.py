@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from instrument.closing import Closing
-from instrument.errors import GonioError
+from instrument.errors import StorageError
 
 GO = "go\n"  # the word that the record is complete
 
@@ -36,7 +36,7 @@ class Afterwards(Closing):
         self._process.communicate()
 
     def finish(self) -> None:
-        """Fit, report, print; raises `GonioError` when that process fails.
+        """Fit, report, print; raises `StorageError` when that process fails.
 
         The scan is over: a Ctrl-C that comes now has nothing left to stop.
         """
@@ -46,7 +46,7 @@ class Afterwards(Closing):
         finally:
             signal.signal(signal.SIGINT, before)
         if self._process.returncode != 0:
-            raise GonioError(
-                f"{self._folder}: the record is complete, but fit and report have failed: "
-                f"gonio report {self._folder}"
+            raise StorageError(
+                f"{self._folder}: the record is complete, but fit and report have failed; go on "
+                f"with: gonio report {self._folder}"
             )

@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from instrument.errors import GonioError, OperatorStop
+from instrument.errors import GonioError, OperatorStop, StorageError
 
 # The program's arrays are small: threads of the linear algebra would only wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -194,7 +194,7 @@ def _do(command: str, *arguments: object, module: str = "acquisition.run") -> No
         raise typer.Exit(error.exit_code) from None
     except OSError as error:
         sys.stderr.write(f"{error}\n")
-        raise typer.Exit(1) from None
+        raise typer.Exit(StorageError.exit_code) from None
     except KeyboardInterrupt:
         sys.stderr.write("stopped by the operator\n")
         raise typer.Exit(OperatorStop.exit_code) from None

@@ -21,9 +21,9 @@ def main() -> None:
         return
     try:
         report_run(Path(sys.argv[1]), sys.argv[2] == "json")
-    except (GonioError, OSError) as error:
+    except GonioError as error:
         sys.stderr.write(f"{error}\n")
-        sys.exit(1)
+        sys.exit(error.exit_code)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from acquisition.plan import Plan
 from instrument.config import Loaded
 from instrument.devices import Frame
 from instrument.errors import InputError, StorageError
-from instrument.files import make_folder, write_whole
+from instrument.files import make_folder, trouble, write_whole
 
 FOLDER = "frames"
 
@@ -28,10 +28,7 @@ def keep(frames: Sequence[Frame], step: int, run: Path) -> tuple[str, ...]:
         for name, frame in zip(names, frames, strict=True):
             write_whole(run / name, cv2.imencode(".tiff", frame.image)[1].tobytes())
     except OSError as error:
-        raise StorageError(
-            f"{error.filename or run / FOLDER}: a frame could not be kept: {error.strerror}: make "
-            "room on that disk, or leave keep_frames out of the next protocol"
-        ) from error
+        raise StorageError(f"{run / FOLDER}: {trouble(error, run)}") from error
     return names
 
 

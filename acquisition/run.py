@@ -22,7 +22,7 @@ from acquisition.rig import prepare
 from acquisition.scan import scan
 from acquisition.terminal import require_yes
 from instrument.config import Loaded, load_protocol
-from instrument.errors import InputError
+from instrument.errors import InputError, StorageError
 from instrument.files import write_whole
 from instrument.record import Record
 
@@ -141,9 +141,13 @@ def as_used(record: Record) -> Loaded:
 def _write_inputs(record: Record) -> None:
     """The run's own copies of protocol and rig; a process may have died before it wrote them."""
     for key, name in (("protocol", PROTOCOL_FILE), ("rig", RIG_FILE)):
-        text = record.meta(key)
-        if text is not None and not (record.folder / name).exists():
-            write_whole(record.folder / name, text)
+        text, path = record.meta(key), record.folder / name
+        if text is None or path.exists():
+            continue
+        try:
+            write_whole(path, text)
+        except StorageError as error:
+            raise StorageError(f"{error}, then: gonio resume {record.folder}") from error
 
 
 def _confirm(yes: bool, steps: int, record: Record) -> None:

@@ -1,16 +1,22 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and what to say when a disk does not take them."""
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 from pathlib import Path
+
+from instrument.errors import StorageError
+
+_FORBIDDEN = (errno.EROFS, errno.EACCES, errno.EPERM)
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
     """Write bytes, or text as UTF-8, under a temporary name, flush it to disk, then rename it.
 
     A reader of `path` sees the old file or the whole new one, never a part, after a power cut too.
-    Raises `OSError`.
+    Raises `StorageError`.
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
@@ -21,8 +27,36 @@ def write_whole(path: Path, content: str | bytes) -> None:
             os.fsync(file.fileno())
         part.replace(path)
         sync_folder(path.parent)
+    except OSError as error:
+        raise StorageError(f"{path}: {trouble(error, path.parent)}") from error
     finally:
+        _forget(part)
+
+
+def _forget(part: Path) -> None:
+    try:
         part.unlink(missing_ok=True)
+    except OSError:
+        return  # the disk takes no change at all: what it refused first is what counts
+
+
+def trouble(error: OSError, folder: Path) -> str:
+    """What a disk met, in words, and what to do about it."""
+    if error.errno == errno.ENOSPC:
+        return full(folder)
+    if error.errno in _FORBIDDEN:
+        return (
+            f"cannot be written ({error.strerror}): look at the folder's permissions and its disk"
+        )
+    if error.errno == errno.ENOENT and not folder.exists():
+        return f"cannot be written: {folder} is no longer there"
+    return f"cannot be written ({error.strerror}): look at the disk"
+
+
+def full(folder: Path) -> str:
+    """A disk that is full, in words."""
+    free_mb = shutil.disk_usage(folder).free / 1e6
+    return f"the disk is full ({free_mb:.1f} MB free): make room on it"
 
 
 def sync_folder(folder: Path) -> None:

@@ -11,10 +11,9 @@ import fcntl
 import json
 import math
 import os
-import shutil
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any
@@ -22,13 +21,14 @@ from typing import Any
 from instrument.closing import Closing
 from instrument.devices import Frame
 from instrument.errors import InputError, StorageError
-from instrument.files import make_folder, sync_folder
+from instrument.files import full, make_folder, sync_folder, trouble
 from instrument.mounts import network_share
 from instrument.reading import Check, Preview, Reading
 from instrument.record_schema import MARKS, SCHEMA_VERSION, begin, connect
 
 FILE_NAME = "record.sqlite"
 LOCK_NAME = ".scanning"
+_CLOSED_TO_US = ("SQLITE_READONLY", "SQLITE_PERM", "SQLITE_CANTOPEN")
 
 
 class Record(Closing):
@@ -54,7 +54,9 @@ class Record(Closing):
             begin(database, meta)
             sync_folder(folder)
         except (OSError, sqlite3.Error) as error:
-            raise InputError(f"{folder}: cannot write the run there: {error}") from error
+            why = _trouble(error, folder)
+            _unmake(folder)
+            raise InputError(f"{folder}: no run can be written there: {why}") from error
         return cls(database, folder)
 
     @classmethod
@@ -68,6 +70,8 @@ class Record(Closing):
             record = cls(connect(path), folder)
             version = record._begun_with()
         except sqlite3.Error as error:
+            if _name_of(error).startswith(_CLOSED_TO_US):
+                raise StorageError(f"{path}: {_trouble(error, folder)}") from error
             raise InputError(f"{path}: not a record of this program: {error}") from error
         if version != str(SCHEMA_VERSION):
             raise InputError(
@@ -100,10 +104,10 @@ class Record(Closing):
         """Close the file; safe twice."""
         self._db.close()
 
-    def where(self) -> Path:
-        """The folder in which the record's file is now, should it have been moved."""
+    def where(self) -> Path | None:
+        """The folder in which the record's file is now, should it have been moved; None: nowhere."""
         found = _path_of(self._file)
-        return found.parent if found is not None and found.is_file() else self.folder
+        return found.parent if found is not None and found.is_file() else None
 
     def meta(self, key: str) -> str | None:
         """One entry of the run's description."""
@@ -270,13 +274,27 @@ def _fate(file: os.stat_result) -> str:
     return "was moved while the scan ran: nothing accepted is lost"
 
 
-def _trouble(error: sqlite3.Error, folder: Path) -> str:
-    """What SQLite met, in words, and what to do about it."""
-    name = getattr(error, "sqlite_errorname", "")
+def _unmake(folder: Path) -> None:
+    """Leave nothing of a record that could not be begun, so that the next try finds room."""
+    for name in (FILE_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm", f"{FILE_NAME}-journal"):
+        with suppress(OSError):
+            (folder / name).unlink()
+    with suppress(OSError):
+        folder.rmdir()
+
+
+def _name_of(error: sqlite3.Error) -> str:
+    return str(getattr(error, "sqlite_errorname", ""))
+
+
+def _trouble(error: OSError | sqlite3.Error, folder: Path) -> str:
+    """What the disk or SQLite met, in words, and what to do about it."""
+    if isinstance(error, OSError):
+        return trouble(error, folder)
+    name = _name_of(error)
     if name == "SQLITE_FULL":
-        free_mb = shutil.disk_usage(folder).free / 1e6
-        return f"the disk is full ({free_mb:.1f} MB free): make room on it"
-    if name.startswith(("SQLITE_READONLY", "SQLITE_PERM", "SQLITE_CANTOPEN")):
+        return full(folder)
+    if name.startswith(_CLOSED_TO_US):
         return f"cannot be written ({error}): look at the folder's permissions and its disk"
     return f"cannot be written ({error}): look at the disk"
 

@@ -198,3 +198,24 @@ def test_frames_that_are_kept_are_whole_and_named(small: Loaded, tmp_path: Path)
     assert image.shape == (small.rig.camera.height_px, small.rig.camera.width_px)
     assert image.dtype == "uint16"
     assert image.max() >= readings[0].peak_dn
+
+
+def test_the_operator_s_word_is_asked_with_what_had_happened_and_written_down(
+    small: Loaded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from acquisition import run
+
+    asked: list[str] = []
+    monkeypatch.setattr(run, "require_yes", lambda question, *_: asked.append(question))
+    with Record.create(tmp_path / "run", {}) as record:
+        record.add_event("2026", "fault", "theta_r: stalled at 12 deg")
+        run._confirm(False, 9, record)
+        run._confirm(True, 9, record)
+        said = [text for _, kind, text in record.events() if kind == "resumed"]
+    assert len(asked) == 1
+    assert "The scan ended with: theta_r: stalled at 12 deg" in asked[0]
+    assert "9 readings are missing. Is the rig clear" in asked[0]
+    assert said == [
+        "the rig may move: yes, asked at the terminal",
+        "the rig may move: --yes",
+    ]

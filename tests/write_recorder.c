@@ -1,12 +1,14 @@
 /* Writes down, in order, what a process does to the files below a folder; loaded with LD_PRELOAD.
  *
- * GONIO_RECORD_ROOT: the folder. recorder_begin(path) starts a log, recorder_mark(n) puts a mark
+ * GONIO_RECORD_ROOT: the folder. GONIO_RECORD_QUOTA: so many bytes may be written there, then the
+ * disk is full. GONIO_RECORD_READ_ONLY: nothing may be. recorder_begin(path) starts a log, recorder_mark(n) puts a mark
  * into it, recorder_kill_at(n) has the process die with SIGKILL before its n-th entry.
  * An entry: six 64-bit numbers (kind, inode, offset, length, path's length, data's length), then
  * the path and the data.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
+#include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
 #include <signal.h>
@@ -45,7 +47,6 @@ static void entry(int64_t kind, int64_t inode, int64_t offset, int64_t length, c
 /* The inode behind a descriptor of a file below the root, or 0. */
 static int64_t watched(int fd, struct stat *st, char *path) {
     char link[64];
-    if (log_fd < 0) return 0;
     snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
     ssize_t n = readlink(link, path, PATH_MAX - 1);
     if (n <= 0) return 0;
@@ -53,11 +54,27 @@ static int64_t watched(int fd, struct stat *st, char *path) {
     return below_root(path) && fstat(fd, st) == 0 ? (int64_t)st->st_ino : 0;
 }
 
-static void wrote(int fd, int64_t offset, const void *data, ssize_t size) {
+/* Whether the write may be done; where it may not, errno says why. */
+static int may_write(int fd, int64_t offset, const void *data, ssize_t size) {
+    static int64_t written;
     struct stat st;
     char path[PATH_MAX];
+    const char *quota = getenv("GONIO_RECORD_QUOTA");
     int64_t inode = watched(fd, &st, path);
-    if (inode) entry(WRITE, inode, offset, size, "", "", data, size);
+    if (!inode) return 1;
+    if (quota && (written += size) > atoll(quota)) {
+        errno = ENOSPC;
+        return 0;
+    }
+    entry(WRITE, inode, offset, size, "", "", data, size);
+    return 1;
+}
+
+/* Whether a name or a file below the root must be left as it is. */
+static int read_only(const char *path) {
+    if (!getenv("GONIO_RECORD_READ_ONLY") || !below_root(path)) return 0;
+    errno = EROFS;
+    return 1;
 }
 
 int recorder_begin(const char *path) {
@@ -84,6 +101,7 @@ static int opened(int fd, const char *path, int known, int flags) {
         mode_t mode = flags & O_CREAT ? va_arg(more, int) : 0;  \
         va_end(more);                                           \
         int known = access(path, F_OK) == 0;                    \
+        if ((flags & (O_WRONLY | O_RDWR)) && read_only(path)) return -1;  \
         return opened(REAL(name)(path, flags, mode), path, known, flags); \
     }
 OPEN(open)
@@ -92,16 +110,16 @@ OPEN(open64)
 ssize_t write(int fd, const void *data, size_t size) {
     if (fd != log_fd) {
         off_t at = lseek(fd, 0, SEEK_CUR);
-        if (at >= 0) wrote(fd, at, data, size);
+        if (at >= 0 && !may_write(fd, at, data, size)) return -1;
     }
     return REAL(write)(fd, data, size);
 }
 ssize_t pwrite(int fd, const void *data, size_t size, off_t at) {
-    wrote(fd, at, data, size);
+    if (!may_write(fd, at, data, size)) return -1;
     return REAL(pwrite)(fd, data, size, at);
 }
 ssize_t pwrite64(int fd, const void *data, size_t size, off64_t at) {
-    wrote(fd, at, data, size);
+    if (!may_write(fd, at, data, size)) return -1;
     return REAL(pwrite64)(fd, data, size, at);
 }
 
@@ -125,14 +143,17 @@ int fsync(int fd) { int done = REAL(fsync)(fd); if (done == 0) synced(fd); retur
 int fdatasync(int fd) { int done = REAL(fdatasync)(fd); if (done == 0) synced(fd); return done; }
 
 int rename(const char *from, const char *to) {
+    if (read_only(to)) return -1;
     if (below_root(to)) entry(RENAME, 0, 0, 0, from, to, "", 0);
     return REAL(rename)(from, to);
 }
 int unlink(const char *path) {
+    if (read_only(path)) return -1;
     if (below_root(path) && access(path, F_OK) == 0) entry(UNLINK, 0, 0, 0, path, "", "", 0);
     return REAL(unlink)(path);
 }
 int mkdir(const char *path, mode_t mode) {
+    if (read_only(path)) return -1;
     int done = REAL(mkdir)(path, mode);
     if (done == 0 && below_root(path)) entry(MAKE_FOLDER, 0, 0, 0, path, "", "", 0);
     return done;
