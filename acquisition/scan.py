@@ -81,6 +81,7 @@ def _write_down(record: Record, clock: Clock, kind: str, why: str) -> None:
 
 def _go_on(record: Record) -> str:
     where = record.where()
-    return (
-        f"{len(record.readings())} readings are safe in {where}. Go on with: gonio resume {where}"
-    )
+    if where is None:
+        return "Nothing is left to go on from"
+    safe = f"{len(record.readings())} readings are safe in {where}"
+    return f"{safe}. Go on with: gonio resume {where}"

@@ -105,7 +105,7 @@ class Record(Closing):
         self._db.close()
 
     def where(self) -> Path | None:
-        """The folder in which the record's file is now, should it have been moved; None: nowhere."""
+        """The folder in which the record's file is now, also when it was moved; None: removed."""
         found = _path_of(self._file)
         return found.parent if found is not None and found.is_file() else None
 
