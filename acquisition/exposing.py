@@ -132,6 +132,7 @@ class Exposer:
         if not exposures_s:
             return
         self.lamp.darken()
+        self._note_hand("lamp covered for the darks")
         for exposure_s in exposures_s:
             self.camera.set_exposure_s(exposure_s)
             dark = dark_of(self.camera.grab(self.protocol.dark_frames), self.rig.camera)
@@ -140,3 +141,8 @@ class Exposer:
             time_utc = self.clock.utc().isoformat()
             self.record.add_dark(time_utc, exposure_s, dark.frames, mean, noise)
         self.lamp.light()
+        self._note_hand("lamp uncovered")
+
+    def _note_hand(self, text: str) -> None:
+        if self.rig.lamp.darkened_by == "hand":
+            self.record.add_event(self.clock.utc().isoformat(), "operator", text)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from acquisition.fitting import Fitted, cost_of
+from acquisition.noted import RETRY
 from acquisition.reduction import DARK, NOISE, ROUNDING, Reduced
 from analysis.fit import FitResult
 from analysis.report_data import Parameter
@@ -77,6 +78,7 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
     found = (
         "" if loaded.rig.real else "all data are simulated",
         _unfinished_note(record),
+        _interruptions_note(record),
         fitted.reason if fitted.choice is not None else "",
         _hidden_note(record),
         _flag_note(reduced),
@@ -109,6 +111,19 @@ def _unfinished_note(record: Record) -> str:
         f"the scan is not finished: {made} of {planned} readings; go on with: "
         f"gonio resume {record.folder}"
     )
+
+
+def _interruptions_note(record: Record) -> str:
+    """How often the scan went on after a stop, what the lamp had done, and what was tried again."""
+    kinds = [kind for _, kind, _ in record.events()]
+    resumed, retries = kinds.count("resumed"), kinds.count(RETRY)
+    jumps = sum(check.jumped for check in record.checks())
+    texts = (
+        f"the scan was interrupted {resumed} times" if resumed else "",
+        f"the lamp had jumped at {jumps} of them, its level is counted anew there" if jumps else "",
+        f"devices were asked again {retries} times (events in the record)" if retries else "",
+    )
+    return "; ".join(text for text in texts if text)
 
 
 def _drift_note(reduced: Reduced) -> str:

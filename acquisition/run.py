@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import platform
 import sys
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -114,11 +115,19 @@ def _meta(loaded: Loaded, plan: Plan) -> Mapping[str, str]:
         "protocol_sha256": _digest(loaded.protocol_text),
         "rig_sha256": _digest(loaded.rig_text),
         "program_version": version("gonio"),
+        "versions": json.dumps(_versions()),
         "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "planned_s": f"{plan.duration_s:.1f}",
         "hidden": str(len(plan.hidden)),
         "steps": str(len(plan.steps)),
     }
+
+
+def _versions() -> dict[str, str]:
+    """What the program ran on; older and newer libraries may round otherwise."""
+    libraries = ("numpy", "scipy", "opencv-contrib-python-headless")
+    found = {name: version(name) for name in libraries}
+    return {"python": platform.python_version(), "system": platform.platform(), **found}
 
 
 def _digest(text: str) -> str:

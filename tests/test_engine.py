@@ -139,6 +139,10 @@ def test_by_hand_the_darks_come_first_and_the_lamp_is_covered_once(record: Recor
     assert {r.exposure_s for r in record.readings()} <= {dark[0] for dark in record.darks()}
     asked = [text for _, kind, text in record.events() if kind == "operator"]
     assert sum("theta_i set to" in text for text in asked) == 2
+    assert [text for text in asked if "covered" in text] == [
+        "lamp covered for the darks",
+        "lamp uncovered",
+    ]
 
 
 def test_the_brightest_part_of_the_window_stays_within_the_target(
