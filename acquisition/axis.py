@@ -31,7 +31,7 @@ class Axis:
         self._stage.home()
 
     def homed(self) -> bool:
-        """Whether it still knows its reference."""
+        """Whether it still knows its reference, asked once it has come to rest."""
         return self._stage.homed()
 
     def settings(self) -> dict[str, str]:

@@ -87,11 +87,14 @@ def grab_frame(
         loaded = _bare(rig_path)
     else:
         loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
+    low, high = loaded.rig.camera.min_exposure_s, loaded.rig.camera.max_exposure_s
+    if exposure_s is not None and not low <= exposure_s <= high:
+        raise InputError(f"--exposure-s: {exposure_s:g} s; the camera can do {low:g} to {high:g} s")
     see_emulated_camera(loaded.rig)
     with Bench(loaded) as bench:
         bench.stand_at(theta_r_deg)
         camera = bench.camera()
-        camera.set_exposure_s(exposure_s or loaded.rig.camera.min_exposure_s)
+        camera.set_exposure_s(low if exposure_s is None else exposure_s)
         frame, identity = camera.grab(1)[0], camera.identity()
     patch = loaded.protocol.window
     window = window_at(theta_r_deg, Pinhole.of(loaded.rig), patch.width_mm, patch.height_mm)

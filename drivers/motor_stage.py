@@ -110,8 +110,17 @@ class MotorStage(ABC):
     # What the program asks for.
 
     def homed(self) -> bool:
-        """Whether the controller knows its reference."""
-        return self.status().homed
+        """Whether the controller knows its reference, asked once the stage has come to rest."""
+        ramp_s = self._limits.speed_deg_per_s / self._limits.acceleration_deg_per_s2
+        until_s = self._clock.now_s() + ramp_s + STALLED_S
+        while (now := self.status()).moving:
+            if self._clock.now_s() > until_s:
+                raise DeviceError(
+                    f"{self.name}: still moves {ramp_s + STALLED_S:.1f} s after it was stopped: "
+                    "cut its power, then look at its controller"
+                )
+            self._clock.sleep(POLL_S)
+        return now.homed
 
     def settings(self) -> dict[str, str]:
         """The limits that hold, and what the controller says that it is set to."""

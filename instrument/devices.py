@@ -60,7 +60,10 @@ class Stage(Protocol):
         ...
 
     def homed(self) -> bool:
-        """Whether it knows its reference; an axis that is set by hand always does."""
+        """Whether it knows its reference, asked once it has come to rest.
+
+        An axis that is set by hand always does.
+        """
         ...
 
     def settings(self) -> dict[str, str]:

@@ -6,8 +6,10 @@ look at one scene, in real time.
 
 from __future__ import annotations
 
+import atexit
 import copy
 import os
+import shutil
 import sys
 import tempfile
 import threading
@@ -33,6 +35,7 @@ from sim.zaber_controller import ZaberController
 
 CAMERA_DEVICE = "/dev/v4l/by-id/emulated-gonio-camera"
 _SOCKET = "GONIO_V4L2_SOCKET"
+_FOLDER = "GONIO_V4L2_FOLDER"  # ours alone: removed when the program ends
 _BEYOND_DEG = 5.0  # the emulated controllers' own limits lie this far past the rig file's
 _FRAMES_PER_S = 400
 
@@ -43,9 +46,12 @@ def restart_with_camera() -> None:
     The loader takes the library that leads to the camera at the start of a process only.
     """
     if _SOCKET in os.environ:
+        if _FOLDER in os.environ:
+            atexit.register(shutil.rmtree, os.environ[_FOLDER], ignore_errors=True)
         return
     folder = Path(tempfile.mkdtemp(prefix="gonio-"))
     added = environment(compiled(folder), CAMERA_DEVICE, folder / "camera")
+    added[_FOLDER] = str(folder)
     os.execve(
         sys.executable,
         [sys.executable, "-m", "acquisition", *sys.argv[1:]],

@@ -218,3 +218,14 @@ def test_nothing_real_moves_before_somebody_has_said_so(real_rig: Path) -> None:
         assert not bench.motor.referenced
         at_terminal(["home", "theta_r", "--rig", real_rig], {"[y/N]": "y\n"}, "stands at 0.0000")
         assert bench.motor.referenced
+
+
+@pytest.mark.parametrize("exposure", ["0", "-1", "9", "nan"])
+def test_an_exposure_that_the_camera_does_not_have_is_refused(
+    exposure: str, tmp_path: Path
+) -> None:
+    out = tmp_path / "frame.tiff"
+    done = gonio("grab", "--rig", BENCH, f"--exposure-s={exposure}", "-o", out)
+    assert done.returncode == 2
+    assert "the camera can do 0.0005 to 2 s" in done.stderr
+    assert not out.exists()

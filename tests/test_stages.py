@@ -15,12 +15,13 @@ from hypothesis import strategies as st
 
 from drivers import newport_framing, zaber_framing
 from drivers.line import Garbled, Line, PortGone
-from drivers.motor_stage import Stopped
+from drivers.motor_stage import MotorStage, Status, Stopped
 from drivers.newport import NewportStage
 from drivers.turns import Turns
 from drivers.zaber import ZaberStage
 from instrument.clock import SystemClock
 from instrument.errors import DeviceError
+from sim.clock import SimulatedClock
 from sim.motor import Motor
 from sim.wire import PtyWire
 from sim.zaber_controller import MICROSTEPS_PER_DEG, ZaberController
@@ -273,6 +274,34 @@ def test_a_zaber_position_is_one_of_rest_even_when_the_move_ends_within_a_reply(
         stage.home()
         stage.start_move(0.005)  # so short that even its beginning is within the tolerance
         assert stage.wait() == pytest.approx(0.005, abs=1e-3)
+
+
+class _Braking(MotorStage):
+    """Comes to rest a while after it was stopped, as what has mass does."""
+
+    def __init__(self, asked_while_moving: int) -> None:
+        super().__init__("theta_r", LIMITS, SimulatedClock())
+        self._left = asked_while_moving
+
+    def status(self, patient: bool = True) -> Status:  # noqa: ARG002 - a stage's form
+        self._left -= 1
+        return Status(5.0, moving=self._left >= 0, homed=True)
+
+    def identity(self) -> str:
+        raise NotImplementedError
+
+    close = _send_home = _apply_speed = _send_stop = _own_limits_deg = identity  # type: ignore[assignment]  # not used
+
+    def _send_move(self, angle_deg: float) -> None:
+        raise NotImplementedError
+
+
+def test_whether_it_knows_its_reference_is_asked_of_a_stage_at_rest() -> None:
+    braking = _Braking(asked_while_moving=7)
+    assert braking.homed()
+    assert braking._left == -1
+    with pytest.raises(DeviceError, match=r"theta_r: still moves .* cut its power"):
+        _Braking(asked_while_moving=10_000).homed()
 
 
 def test_zaber_checksum_is_the_manual_s() -> None:
