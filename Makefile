@@ -3,6 +3,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Six workers need not each read the files that have no such test.
+WAITING = $(shell grep -l 'pytest\.mark\.waits' tests/test_*.py)
 
 .PHONY: demo test lint clean
 
@@ -10,8 +12,8 @@ demo: $(VENV)/.installed
 	$(BIN)/gonio run configs/protocols/demo.yaml
 
 test: $(VENV)/.installed-dev lint
-	$(BIN)/pytest -n auto -m "not hil and not waits"
-	$(BIN)/pytest -n 6 -m "waits and not hil"
+	$(BIN)/pytest -n auto --dist worksteal -m "not hil and not waits"
+	$(BIN)/pytest -n 6 -m "waits and not hil" $(WAITING)
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -13,6 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+# Before NumPy: the arrays are small, and threads that wait for one another cost twice the time.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from instrument.config import Loaded, load_protocol
 from instrument.rig_config import Rig
@@ -89,6 +93,15 @@ def recorder(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     options = ["-O1", "-Wall", "-Werror", "-shared", "-fPIC"]
     subprocess.run([compiler, *options, "-o", library, source, "-ldl"], check=True, timeout=60)
     return {"LD_PRELOAD": str(library)}
+
+
+def small_demo(folder: Path) -> Path:
+    """The demo's protocol in that folder, with two incidences and nine view angles."""
+    text = (CONFIGS / "protocols" / "demo.yaml").read_text()
+    text = text.replace("[30.0, 45.0, 60.0]", "[30.0, 60.0]").replace("num: 33", "num: 9")
+    path = folder / "small.yaml"
+    path.write_text(text.replace("../rigs/", f"{CONFIGS / 'rigs'}/"))
+    return path
 
 
 @pytest.fixture

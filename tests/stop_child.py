@@ -1,7 +1,7 @@
 """A scan in a process of its own that is stopped in the middle of a move; writes how it went.
 
-`python stop_child.py BENCH HOW`: SIGINT, SIGTERM, or `exception` in the scan itself. Writes the
-seconds from that moment to the stop's arrival on the wire.
+`python stop_child.py BENCH HOW ...`: SIGINT, SIGTERM, or `exception` in the scan itself, a scan for
+each. Writes the seconds from that moment to the stop's arrival on the wire.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ DEADLINE_S = 10.0
 
 
 def main(name: str, how: str) -> None:
-    stop_on_signals()
+    stop_on_signals()  # anew for each scan: the stop before was another command's
     with BENCHES[name](SLOW) as bench, TemporaryDirectory() as folder:
         moment: list[float] = []
         threading.Thread(target=_interrupt, args=(bench, how, moment), daemon=True).start()
@@ -92,4 +92,5 @@ class _Failing:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    for each in sys.argv[2:]:
+        main(sys.argv[1], each)

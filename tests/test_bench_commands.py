@@ -15,7 +15,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from conftest import CONFIGS, ROOT, gonio
+from conftest import CONFIGS, ROOT
+from in_process import gonio_here as gonio
 
 from acquisition.terminal import TerminalOperator
 from drivers.hand_set import HandSetAxis

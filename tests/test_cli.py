@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import re
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -14,36 +14,40 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import CONFIGS
+from conftest import gonio as gonio_process
+from conftest import small_demo
+from in_process import gonio_here as gonio
 
 DEADLINE_S = 60.0
-DEMO = CONFIGS / "protocols" / "demo.yaml"
-
-
-def gonio(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "acquisition", *map(str, arguments)],
-        capture_output=True, text=True, check=False, cwd=cwd, timeout=DEADLINE_S,
-        stdin=subprocess.DEVNULL,
-    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A protocol of two incidences and nine view angles."""
-    text = DEMO.read_text()
-    text = text.replace("[30.0, 45.0, 60.0]", "[30.0, 60.0]").replace("num: 33", "num: 9")
-    text = text.replace("../rigs/", f"{CONFIGS / 'rigs'}/")
-    path = tmp_path_factory.mktemp("protocol") / "small.yaml"
-    path.write_text(text)
-    return path
+    return small_demo(tmp_path_factory.mktemp("protocol"))
 
 
 @pytest.fixture(scope="module")
-def finished(small: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run(
+    small: Path, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, subprocess.CompletedProcess[str]]:
+    """A run by a process of its own: its folder, and what it said."""
     folder = tmp_path_factory.mktemp("runs") / "run"
-    done = gonio("run", small, "--out", folder)
+    done = gonio_process("run", small, "--out", folder)
     assert done.returncode == 0, done.stderr
+    return folder, done
+
+
+@pytest.fixture(scope="module")
+def finished(run: tuple[Path, subprocess.CompletedProcess[str]]) -> Path:
+    return run[0]
+
+
+@pytest.fixture(scope="module")
+def stopped(small: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run that somebody stopped with Ctrl-C: copy it before anything is done to it."""
+    folder = tmp_path_factory.mktemp("stopped") / "run"
+    _stop_after_some_readings(small, folder, signal.SIGINT)
     return folder
 
 
@@ -80,11 +84,13 @@ def test_the_fit_keeps_its_contract(finished: Path) -> None:
             assert parameter["u"] is not None or len(parameter["interval"]) == 2
 
 
-def test_the_person_is_told_the_model_and_where_the_report_is(small: Path, tmp_path: Path) -> None:
-    done = gonio("run", small, "--out", tmp_path / "run")
+def test_the_person_is_told_the_model_and_where_the_report_is(
+    run: tuple[Path, subprocess.CompletedProcess[str]],
+) -> None:
+    folder, done = run
     assert "oren_nayar+torrance_sparrow" in done.stdout
     assert re.search(r"sigma_deg\s.*±", done.stdout)
-    assert str(tmp_path / "run" / "report.html") in done.stdout
+    assert str(folder / "report.html") in done.stdout
 
 
 def test_json_is_alone_on_standard_output(finished: Path, tmp_path: Path, small: Path) -> None:
@@ -128,12 +134,11 @@ def test_every_mistake_in_a_file_is_named_at_once_and_nothing_moves(
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT])  # SIGTERM: `test_emulated`
+# SIGTERM: `test_emulated`
 def test_a_stopped_scan_says_how_to_go_on_and_goes_on(
-    small: Path, finished: Path, tmp_path: Path, stop: signal.Signals
+    stopped: Path, finished: Path, tmp_path: Path
 ) -> None:
-    folder = tmp_path / "run"
-    _stop_after_some_readings(small, folder, stop)
+    folder = shutil.copytree(stopped, tmp_path / "run")
     resumed = gonio("resume", folder, "--yes")
     assert resumed.returncode == 0, resumed.stderr
     again, whole = rows(folder), rows(finished)
@@ -156,7 +161,7 @@ def _stop_after_some_readings(protocol: Path, folder: Path, stop: signal.Signals
     while _readings(folder) < 3:
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < deadline
-        os.sched_yield()
+        time.sleep(0.01)
     process.send_signal(stop)
     _, errors = process.communicate(timeout=DEADLINE_S)
     assert process.returncode == 4, errors
@@ -176,9 +181,8 @@ def _readings(folder: Path) -> int:
         return 0
 
 
-def test_resuming_needs_a_word_that_the_rig_may_move(small: Path, tmp_path: Path) -> None:
-    _stop_after_some_readings(small, tmp_path / "run", signal.SIGINT)
-    done = gonio("resume", tmp_path / "run")
+def test_resuming_needs_a_word_that_the_rig_may_move(stopped: Path) -> None:
+    done = gonio("resume", stopped)
     assert done.returncode == 2
     assert "--yes" in done.stderr
 
@@ -193,8 +197,6 @@ def test_a_finished_run_is_reported_again(finished: Path) -> None:
 
 
 def test_a_changed_protocol_is_not_resumed(finished: Path, tmp_path: Path) -> None:
-    import shutil
-
     copy = tmp_path / "copy"
     shutil.copytree(finished, copy)
     path = copy / "protocol.yaml"
@@ -237,8 +239,8 @@ def test_usage_errors_exit_with_2() -> None:
     assert "no_such_protocol.yaml" in missing.stderr
 
 
-def test_a_stopped_run_is_reported_as_unfinished(small: Path, tmp_path: Path) -> None:
-    _stop_after_some_readings(small, tmp_path / "run", signal.SIGINT)
+def test_a_stopped_run_is_reported_as_unfinished(stopped: Path, tmp_path: Path) -> None:
+    shutil.copytree(stopped, tmp_path / "run")
     done = gonio("report", tmp_path / "run")
     assert done.returncode in (0, 5), done.stderr
     assert "Traceback" not in done.stderr

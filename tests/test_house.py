@@ -31,3 +31,12 @@ def test_the_help_imports_nothing_heavy(heavy: str) -> None:
 def test_the_report_is_the_only_one_that_needs_matplotlib() -> None:
     script = "import acquisition.run, sys; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
+
+
+def test_a_waiting_test_carries_its_mark_in_its_own_file() -> None:
+    """`make test` looks for the mark in the text of tests/test_*.py, and runs those files."""
+    mark = "pytest.mark." + "waits"
+    helpers = [p for p in (ROOT / "tests").glob("*.py") if not p.name.startswith("test_")]
+    assert helpers
+    assert not [p.name for p in helpers if mark in p.read_text()]
+    assert mark.replace(".", r"\.") in (ROOT / "Makefile").read_text()

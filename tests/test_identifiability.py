@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from analysis.choice import choose
-from analysis.fit import fit
+from analysis.fit import FitResult, fit
 from analysis.measurements import Measurements
 from analysis.models import MODELS
 from instrument.geometry import Geometry
@@ -118,13 +119,18 @@ def test_a_relative_scan_gives_the_roughness_and_no_scale(
     assert absolute < 1.1 * (found.u["sigma_deg"] or np.inf)
 
 
+@cache
+def relative_scan() -> tuple[Measurements, FitResult]:
+    m = scan("oren_nayar", THETA_I, THETA_R, 3, **ROUGH)
+    return m, fit(MODELS["oren_nayar"], replace(m, relative=True))
+
+
 @given(exponent=st.floats(-9, 9))
 @settings(max_examples=8)
 def test_the_unit_of_a_relative_scan_does_not_matter(exponent: float) -> None:
-    m = scan("oren_nayar", THETA_I, THETA_R, 3, **ROUGH)
+    m, one = relative_scan()
     assert m.u_random is not None
     factor = 10.0**exponent
-    one = fit(MODELS["oren_nayar"], replace(m, relative=True))
     scaled = replace(m, brdf=factor * m.brdf, u_random=factor * m.u_random, relative=True)
     other = fit(MODELS["oren_nayar"], scaled)
     assert other.chi2 == pytest.approx(one.chi2, rel=1e-6)

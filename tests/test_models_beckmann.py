@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import mpmath as mp
 import numpy as np
@@ -37,9 +37,11 @@ WEIGHTS: dict[str, Callable[..., object]] = {  # for numbers of either kind
 ROUGHNESSES = [1e-12, 1e-3, 1.0, 10.0, 39.0, 41.0, 70.0, 100.0, 1e4, 1e6]
 
 
-def exact_sum(
-    g: mp.mpf, q: mp.mpf, weight: Callable[..., object] = WEIGHTS["of the lobe"]
-) -> mp.mpf:
+def exact_sum(g: mp.mpf, q: mp.mpf) -> mp.mpf:
+    return exact_sums(g, q, ["of the lobe"])[0]
+
+
+def exact_sums(g: mp.mpf, q: mp.mpf, names: Sequence[str]) -> list[mp.mpf]:
     """e^-g sum g^m/(m!) w(m) e^(-q/m), outwards from its largest term, until no term counts."""
 
     def rises(m: int) -> bool:  # from term m to term m + 1
@@ -52,18 +54,19 @@ def exact_sum(
         middle = (low + high) // 2
         low, high = (middle, high) if rises(middle) else (low, middle)
     peak = mp.exp(high * mp.log(g) - mp.loggamma(high + 1) - g)
-    total = mp.mpf(0)
+    totals = [mp.mpf(0)] * len(names)
     for step in (1, -1):
         m, poisson, first = high, peak, peak * mp.exp(-q / high)
         while m >= 1:
             term = poisson * mp.exp(-q / m)
             if step == 1 or m < high:
-                total += term * weight(mp.mpf(m), g, q)
+                weights = [WEIGHTS[name](mp.mpf(m), g, q) for name in names]
+                totals = [total + term * w for total, w in zip(totals, weights, strict=True)]
             if term < first * mp.mpf("1e-18"):
                 break
             poisson = poisson * g / (m + 1) if step == 1 else poisson * m / g
             m += step
-    return total
+    return totals
 
 
 @pytest.mark.parametrize("g", ROUGHNESSES)
@@ -71,21 +74,22 @@ def test_the_sum_to_eleven_digits(g: float) -> None:
     """From the mirror direction (q = 0) to wings 1e-200 of the peak, and either side of m = 40."""
     base = max(g, 1.0)
     with mp.workdps(25):
-        for q in (0.0, 1e-9, 0.3 * base, 20 * base, 250 * base)[:: 2 if g > 1e5 else 1]:
+        places = (0.0, 1e-9, 0.3 * base, 20 * base, 250 * base)
+        # So many terms take seconds: without q = 0, which has its own test in closed form.
+        for q in places if g < 1e5 else places[2::2]:
             expected = exact_sum(mp.mpf(g), mp.mpf(q))
             found = float(poisson_sum(np.array(g), np.array(q), WEIGHTS["of the lobe"]))
             assert found == pytest.approx(float(expected), rel=3e-11, abs=1e-290)
 
 
-@pytest.mark.parametrize("name", list(WEIGHTS))
 @pytest.mark.parametrize("g", [1e-3, 2.0, 25.0, 45.0, 300.0, 2e4])
-def test_the_sums_of_the_slopes(name: str, g: float) -> None:
-    with mp.workdps(25):
-        for q in (0.0, 0.3 * g, 20 * g, 900.0):
-            size = float(exact_sum(mp.mpf(g), mp.mpf(q)))
-            expected = float(exact_sum(mp.mpf(g), mp.mpf(q), WEIGHTS[name]))
-            found = float(poisson_sum(np.array(g), np.array(q), WEIGHTS[name]))
-            assert abs(found - expected) <= 1e-9 * max(abs(expected), size) + 1e-290
+def test_the_sums_of_the_slopes(g: float) -> None:
+    for q in (0.0, 0.3 * g, 20 * g, 900.0):
+        with mp.workdps(25):
+            sums = [float(s) for s in exact_sums(mp.mpf(g), mp.mpf(q), list(WEIGHTS))]
+        for (name, weight), expected in zip(WEIGHTS.items(), sums, strict=True):
+            found = float(poisson_sum(np.array(g), np.array(q), weight))
+            assert abs(found - expected) <= 1e-9 * max(abs(expected), sums[0]) + 1e-290, (name, q)
 
 
 @settings(deadline=None)

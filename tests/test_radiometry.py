@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -34,8 +35,9 @@ def _frames(mean: float, sd: float, count: int, seed: int = 1) -> list[Frame]:
     ]
 
 
-def _dark(level: float = 64.0) -> Dark:
-    return dark_of(_frames(level, 1.1, 8, seed=2), CAMERA)
+@cache
+def _dark() -> Dark:
+    return dark_of(_frames(64.0, 1.1, 8, seed=2), CAMERA)
 
 
 def test_the_dark_is_subtracted_and_cos4_divided_out() -> None:

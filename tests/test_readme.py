@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from conftest import CONFIGS, ROOT
+from in_process import gonio_here
 
 from instrument.config import load_protocol
 
@@ -25,10 +26,7 @@ def test_the_commands_run_in_their_order(tmp_path: Path) -> None:
     gonio = [line.split()[1:] for line in commands if line.startswith("gonio ")]
     assert len(gonio) >= 4
     for arguments in gonio:
-        done = subprocess.run(
-            [sys.executable, "-m", "acquisition", *arguments],
-            cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120,
-        )  # fmt: skip
+        done = gonio_here(*arguments, cwd=tmp_path)
         assert done.returncode == 0, (arguments, done.stderr)
 
 

@@ -15,18 +15,21 @@ from conftest import ROOT
 BOUND_S = {"newport": 0.1, "zaber": 0.1, "oriental rtu": 0.3, "oriental tcp": 0.3}
 
 
-@pytest.mark.parametrize("how", ["SIGINT", "SIGTERM", "exception"])
+HOWS = {"SIGINT": "KeyboardInterrupt", "SIGTERM": "KeyboardInterrupt", "exception": "DeviceError"}
+
+
 @pytest.mark.parametrize("bench", list(BENCHES))
-def test_a_stop_is_on_the_wire_in_time(bench: str, how: str) -> None:
+def test_a_stop_is_on_the_wire_in_time(bench: str) -> None:
     tests = Path(__file__).parent
     done = subprocess.run(
-        [sys.executable, str(tests / "stop_child.py"), bench, how],
+        [sys.executable, str(tests / "stop_child.py"), bench, *HOWS],
         capture_output=True, text=True, timeout=60, check=False, cwd=ROOT,
         env={**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{tests}"},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    ended, figures = done.stdout.splitlines()
-    assert ended == ("DeviceError" if how == "exception" else "KeyboardInterrupt")
-    seconds, moving = figures.split()
-    assert 0 <= float(seconds) < BOUND_S[bench]
-    assert moving == "False"
+    lines = done.stdout.splitlines()
+    assert lines[::2] == list(HOWS.values())
+    for how, figures in zip(HOWS, lines[1::2], strict=True):
+        seconds, moving = figures.split()
+        assert 0 <= float(seconds) < BOUND_S[bench], how
+        assert moving == "False", how

