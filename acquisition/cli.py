@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from instrument.errors import GonioError, OperatorStop, StorageError
+from instrument.plain_text import harmless
 
 # The program's arrays are small: threads of the linear algebra would only wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -190,10 +191,10 @@ def _do(command: str, *arguments: object, module: str = "acquisition.run") -> No
     try:
         getattr(importlib.import_module(module), command)(*arguments)
     except GonioError as error:
-        sys.stderr.write(f"{error}\n")
+        sys.stderr.write(f"{harmless(str(error))}\n")
         raise typer.Exit(error.exit_code) from None
     except OSError as error:
-        sys.stderr.write(f"{error}\n")
+        sys.stderr.write(f"{harmless(str(error))}\n")
         raise typer.Exit(StorageError.exit_code) from None
     except KeyboardInterrupt:
         sys.stderr.write("stopped by the operator\n")

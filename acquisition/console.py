@@ -4,22 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
 from acquisition.kept_frames import kept_bytes
 from acquisition.plan import Plan, Step, lamp_settings
 from instrument.config import Loaded
+from instrument.plain_text import harmless
 
 if TYPE_CHECKING:
     from acquisition.results import Outcome
 
+
+class _Harmless(Console):
+    """Shows names as they are: no markup in them, and no commands to the terminal."""
+
+    def render_str(self, text: str, **how: Any) -> Text:
+        """Text for the terminal."""
+        return super().render_str(harmless(text), **how)
+
+
 # Progress and prompts go to standard error: standard output may be JSON.
-console = Console(stderr=True, markup=False)
-out = Console(markup=False)
+console = _Harmless(stderr=True, markup=False, emoji=False)
+out = _Harmless(markup=False, emoji=False)
 
 
 def ask(question: str) -> str:

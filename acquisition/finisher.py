@@ -9,6 +9,7 @@ from pathlib import Path
 from acquisition.afterwards import GO
 from acquisition.run import report_run
 from instrument.errors import GonioError
+from instrument.plain_text import harmless
 
 NEEDED = ("acquisition.results", "matplotlib.figure", "matplotlib.backends.backend_svg")
 
@@ -22,7 +23,7 @@ def main() -> None:
     try:
         report_run(Path(sys.argv[1]), sys.argv[2] == "json")
     except GonioError as error:
-        sys.stderr.write(f"{error}\n")
+        sys.stderr.write(f"{harmless(str(error))}\n")
         sys.exit(error.exit_code)
 
 

@@ -17,6 +17,7 @@ from analysis.measurements import Measurements
 from instrument.errors import InputError, NotDetermined
 from instrument.record import FILE_NAME, Record
 
+_LEAST_MEAN = 1e-15  # no light at all: nothing to be relative to
 FORMATS = ("auto", "run", "csv", "curet")
 
 
@@ -92,7 +93,11 @@ def _run(path: Path) -> Source:
     flagged = int(np.sum(~reduced.sound))
     note = (f"{flagged} of {reduced.sound.size} points are flagged and not fitted",)
     acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
-    return Source(measurements(reduced, loaded), acceptance, note if flagged else ())
+    try:
+        found = measurements(reduced, loaded)
+    except ValueError as error:  # values that are no measurement, such as a u of 0
+        raise NotDetermined(f"{path}: {error}") from None
+    return Source(found, acceptance, note if flagged else ())
 
 
 def _curet(path: Path, wanted: Wanted) -> Source:
@@ -115,8 +120,9 @@ def _cut(source: Source, max_theta_deg: float) -> Source:
 
 
 def _made_relative(path: Path, m: Measurements) -> Measurements:
-    if m.size and not np.mean(m.brdf) > 0:
+    if m.size and not np.mean(m.brdf) > _LEAST_MEAN:
         raise InputError(
-            f"{path}: brdf: mean {np.mean(m.brdf):g}; allowed for relative values: more than 0"
+            f"{path}: brdf: mean {np.mean(m.brdf):g}; allowed for relative values: more than "
+            f"{_LEAST_MEAN:g}"
         )
     return replace(m, relative=True)

@@ -34,8 +34,9 @@ class Column:
         return value
 
 
-BRDF = Column("brdf", "1/sr", "a finite number of 1/sr")
-U_BRDF = Column("u_brdf", "1/sr", "more than 0 1/sr", math.nextafter(0.0, 1.0))
+# Far beyond any measurement; squares and ratios of what lies within can still be computed.
+BRDF = Column("brdf", "1/sr", "-1e15 to 1e15 1/sr", -1e15, 1e15)
+U_BRDF = Column("u_brdf", "1/sr", "1e-15 to 1e15 1/sr", 1e-15, 1e15)
 NEEDED = (
     Column("theta_i_deg", "deg", "a number from 0 to 90 deg", 0.0, 90.0),
     Column("theta_r_deg", "deg", "a number from -90 to 90 deg", -90.0, 90.0),

@@ -35,7 +35,7 @@ def read_csv(path: Path) -> Measurements:
     which a scan with several dphi holds, and is read.
     Raises `InputError` with every mistake in the file, the first 20 of them in words.
     """
-    file = read_text(path)
+    file = read_text(path, pipe=True)
     rows = file.rows()
     table = _Table(file, read_header(file, rows))
     for line, text in rows:

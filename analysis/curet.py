@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.csv_header import BRDF
 from analysis.measurements import Measurements
 from analysis.text_file import TextFile, error_of, number, read_text
 from instrument.errors import InputError
@@ -136,13 +137,14 @@ def _angle(file: TextFile, line: int, name: str, field: tuple[int, str]) -> floa
     """An angle in radians, NaN with its mistake noted if it is none."""
     column, text = field
     theta = name.startswith("theta")
-    allowed = "a number from 0 to 1.570796 rad" if theta else "a finite number of rad"
+    allowed = "a number from 0 to 1.570796 rad" if theta else "a number from -1e6 to 1e6 rad"
     try:
         angle = number(text)
     except ValueError as error:
         file.note(line, column, f"{name}: {error}; allowed: {allowed}")
         return math.nan
-    if theta and not 0 <= angle <= math.pi / 2 + _ROUNDING_RAD:
+    low, high = (0.0, math.pi / 2 + _ROUNDING_RAD) if theta else (-1e6, 1e6)
+    if not low <= angle <= high:
         file.note(line, column, f"{name}: {text[:40]} rad; allowed: {allowed}")
     return angle
 
@@ -175,9 +177,9 @@ def _row(file: TextFile, line: int, directions: int) -> list[float]:
     values = []
     for n, (column, value) in enumerate(fields[1:], start=1):
         try:
-            values.append(number(value))
+            values.append(BRDF.value(value))
         except ValueError as error:
-            file.note(line, column, f"v{n}: {error}; allowed: a finite number of 1/sr")
+            file.note(line, column, f"v{n}: {error}")
     return values
 
 

@@ -12,10 +12,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from instrument.errors import InputError
+from instrument.files import read_file
 from instrument.yaml_marks import printable, shown
 
 MAX_BYTES = 64 * 1024**2  # some 400 000 rows of a run's measurements.csv
+MAX_LINES = 2_000_000
+MAX_LINE = 1024**2  # characters; a thousand columns need some 20 000
 MAX_REPORTED = 20
+MAX_NOTED = 10_000  # what is all wrong need not be read to its end
 
 
 @dataclass(slots=True)
@@ -33,8 +37,10 @@ class TextFile:
                 yield line, text
 
     def note(self, line: int, column: int, text: str) -> None:
-        """Note a mistake."""
+        """Note a mistake; raises `InputError` with those so far when there are MAX_NOTED."""
         self.mistakes.append((line, column, text))
+        if len(self.mistakes) >= MAX_NOTED:
+            raise error_of(self)
 
 
 def error_of(*files: TextFile) -> InputError:
@@ -45,19 +51,24 @@ def error_of(*files: TextFile) -> InputError:
         for line, column, text in sorted(file.mistakes, key=lambda mistake: mistake[:2])
     ]
     more = len(lines) - MAX_REPORTED
-    return InputError(*lines[:MAX_REPORTED], *([f"... and {more} more"] if more > 0 else []))
+    least = "at least " if any(len(file.mistakes) >= MAX_NOTED for file in files) else ""
+    tail = [f"... and {least}{more} more"] if more > 0 else []
+    return InputError(*lines[:MAX_REPORTED], *tail)
 
 
-def read_text(path: Path) -> TextFile:
+def read_text(path: Path, *, pipe: bool = False) -> TextFile:
     """Read a UTF-8 file (with or without a byte order mark, lines ending in LF, CRLF or CR).
 
-    Raises `InputError` for a file that cannot be opened, that is larger than MAX_BYTES or that is
-    not UTF-8 text.
+    `pipe`: it may be a pipe. Raises `InputError` for a file that cannot be opened, that is not
+    UTF-8 text, or that is larger than MAX_BYTES, MAX_LINES or MAX_LINE.
     """
     name = printable(str(path))
-    raw = _bytes(path, name).removeprefix(b"\xef\xbb\xbf")
+    raw = _bytes(path, name, pipe).removeprefix(b"\xef\xbb\xbf")
+    count = 1 + raw.count(b"\n") + raw.count(b"\r") - raw.count(b"\r\n")
+    if count > MAX_LINES:
+        raise InputError(f"{name}: {count} lines; allowed: {MAX_LINES}; split it")
     try:
-        return TextFile(name, _lines(raw))
+        return _with_short_lines(TextFile(name, _lines(raw)))
     except UnicodeDecodeError as error:
         before = _lines(raw[: error.start])
         file = TextFile(name, before)
@@ -66,10 +77,17 @@ def read_text(path: Path) -> TextFile:
         raise error_of(file) from None
 
 
-def _bytes(path: Path, name: str) -> bytes:
+def _with_short_lines(file: TextFile) -> TextFile:
+    for line, text in enumerate(file.lines, start=1):
+        if len(text) > MAX_LINE:
+            file.note(line, 1, f"a line of {len(text)} characters; allowed: {MAX_LINE}")
+            raise error_of(file)
+    return file
+
+
+def _bytes(path: Path, name: str, pipe: bool) -> bytes:
     try:
-        with path.open("rb") as file:
-            raw = file.read(MAX_BYTES + 1)
+        raw = read_file(path, MAX_BYTES, pipe=pipe)
     except FileNotFoundError:
         raise InputError(f"{name}: no such file; check its name and folder") from None
     except IsADirectoryError:

@@ -6,6 +6,8 @@ pyserial's own behaviour on a lost port differs from call to call (`SerialExcept
 
 from __future__ import annotations
 
+import math
+import re
 import termios
 import time
 from collections.abc import Callable
@@ -18,6 +20,7 @@ from instrument.errors import DeviceError
 REPLY_S = 0.15  # controllers answer within 10 to 50 ms; a stop waits no longer than this, and an
 # answer that was lost is had again before the status of a moving stage is too old
 MOST_BYTES = 1024  # of a line: what is longer is noise
+_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 A = TypeVar("A")
 T = TypeVar("T")
@@ -33,6 +36,12 @@ class NoReply(DeviceError):
 
 class Garbled(DeviceError):
     """What came is no answer to what was asked."""
+
+
+def number_of(text: str) -> float | None:
+    """A number as controllers write it, `-12.5` or `1.2E-05`; None for all else, nan and inf."""
+    value = float(text) if _NUMBER.fullmatch(text) else math.inf
+    return value if math.isfinite(value) else None
 
 
 class Line(Closing):
@@ -85,6 +94,8 @@ class Line(Closing):
             if left_s <= 0 or len(self._buffer) > MOST_BYTES:
                 raise self._no_line(who)
             self._buffer += self._guarded(self._read, left_s)
+        if end > MOST_BYTES:
+            raise self._no_line(who)
         line = bytes(self._buffer[:end])
         del self._buffer[: end + 1]
         return line.replace(b"\0", b"").strip(b"\r")

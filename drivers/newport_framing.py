@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from drivers.line import Garbled
+from drivers.line import Garbled, number_of
 
 END = b"\r\n"
 
@@ -116,11 +116,11 @@ def answer_to(address: int, letters: str, line: bytes) -> str | None:
 
 
 def number(who: str, letters: str, text: str) -> float:
-    """The value of an answer, in the stage's unit. Raises `Garbled` where it is none."""
-    try:
-        return float(text)
-    except ValueError:
-        raise Garbled(f"{who}: answers {letters} with {text!r}; expected: a number") from None
+    """The value of an answer, in the stage's unit, finite. Raises `Garbled` where it is none."""
+    value = number_of(text)
+    if value is None:
+        raise Garbled(f"{who}: answers {letters} with {text!r}; expected: a number")
+    return value
 
 
 def state(who: str, text: str) -> State:

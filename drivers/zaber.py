@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable
 
 from drivers import zaber_framing as framing
-from drivers.line import Garbled, Line, NoReply
+from drivers.line import Garbled, Line, NoReply, number_of
 from drivers.motor_stage import Limits, MotorStage, Status
 from drivers.zaber_framing import Reply
 from instrument.clock import Clock
@@ -121,12 +121,10 @@ class ZaberStage(MotorStage):
         return int(self._value(self._port.ask(f"get {setting}", axis), setting))
 
     def _value(self, reply: Reply, setting: str) -> float:
-        try:
-            return float(reply.data)
-        except ValueError:
-            raise Garbled(
-                f"{self._who}: answers {setting} with {reply.data!r}; expected: a number"
-            ) from None
+        value = number_of(reply.data)
+        if value is None:
+            raise Garbled(f"{self._who}: answers {setting} with {reply.data!r}; expected: a number")
+        return value
 
     def _own_limits_deg(self) -> tuple[float, float]:
         return self._range

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from instrument.section import Finite, Name, NotNegative, Positive, Section
+from instrument.section import Finite, NotNegative, Positive, Section
 
 AXES = ("theta_i", "dphi", "theta_r")
 AxisName = Literal["theta_i", "dphi", "theta_r"]
@@ -18,6 +18,17 @@ EMULATED = "emulated"
 """In place of a port or a device: the driver talks to an emulated one, over the simulated scene."""
 
 LEAST_TOLERANCE_DEG = 0.01
+
+# pyserial has more kinds of address, of which one writes to any file that it names (spy://).
+Port = Annotated[
+    str,
+    Field(
+        min_length=1,
+        max_length=200,
+        pattern=r"^(/[^\n\t]*|[^:\n\t]*|(socket|rfc2217|tcp)://[^\n\t]*)$",
+        description="a device's path, socket://host:port, rfc2217://host:port or tcp://host:port",
+    ),
+]
 
 
 class _Axis(Section):
@@ -82,7 +93,7 @@ class NewportAxis(_MotorAxis):
     """A motor behind Newport's SMC100 or CONEX-CC; `port` is best a /dev/serial/by-id path."""
 
     driver: Literal["newport"]
-    port: Name
+    port: Port
     model: Literal["SMC100", "CONEX-CC"] = "SMC100"
     address: Annotated[int, Field(ge=1, le=31)] = 1
 
@@ -96,7 +107,7 @@ class ZaberAxis(_MotorAxis):
     """A Zaber stage; `microsteps_per_deg` is the stage's own (X-RSW60: 4266.667)."""
 
     driver: Literal["zaber"]
-    port: Name
+    port: Port
     device: Annotated[int, Field(ge=1, le=99)] = 1
     axis: Annotated[int, Field(ge=1, le=9)] = 1
     microsteps_per_deg: Positive
@@ -115,7 +126,7 @@ class OrientalAxis(_MotorAxis):
     """
 
     driver: Literal["oriental"]
-    port: Name
+    port: Port
     unit: Annotated[int, Field(ge=1, le=247)] = 1
     steps_per_deg: Positive
     baudrate: Annotated[int, Field(ge=9600, le=921600)] = 115200

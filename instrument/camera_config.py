@@ -102,7 +102,7 @@ class V4l2Camera(Camera):
         yield from super().mistakes()
         for key in ("min_exposure_s", "max_exposure_s"):
             steps = getattr(self, key) / V4L2_EXPOSURE_STEP_S
-            if abs(steps - round(steps)) > 1e-6 or round(steps) < 1:
+            if not 0.5 < steps < 1e15 or abs(steps - round(steps)) > 1e-6:
                 yield key, f"{getattr(self, key):g}; allowed: whole multiples of 0.0001 s"
         most = _FORMAT_BITS[self.pixel_format]
         if self.bit_depth > most or (most < 16 and self.bit_depth != most):

@@ -26,8 +26,8 @@ from instrument.protocol_config import (
 )
 from instrument.rig_config import Rig
 from instrument.section import Section
+from instrument.yaml_file import yaml_bytes
 from instrument.yaml_marks import (
-    MAX_BYTES,
     KeyPath,
     Mark,
     MarkedYaml,
@@ -60,7 +60,7 @@ class Loaded:
 
 def load_rig(path: Path) -> Rig:
     """Read a rig file. Raises `InputError` with every mistake in it."""
-    file = _File(path, read_yaml(_bytes(path)))
+    file = _File(path, read_yaml(yaml_bytes(path)))
     rig = file.check(Rig)
     if rig is None or file.found:
         raise InputError(*_report(file))
@@ -76,7 +76,7 @@ def load_protocol(
     parameters are None where the protocol only names the model.
     Raises `InputError` with every mistake in either file and between them.
     """
-    file = _File(path, read_yaml(_bytes(path)))
+    file = _File(path, read_yaml(yaml_bytes(path)))
     protocol = file.check(Protocol)
     for at, text in own_mistakes(file.marked, check_model):
         file.add(at, text)
@@ -95,50 +95,23 @@ def _rig_file(protocol: _File, rig_path: Path | None) -> _File | None:
     """The rig's file; None, with its mistake noted, if the one that the protocol names is not."""
     if rig_path is not None:
         try:
-            return _File(rig_path, read_yaml(_bytes(rig_path)))
+            return _File(rig_path, read_yaml(yaml_bytes(rig_path)))
         except InputError as error:
             raise InputError(*_report(protocol), *error.problems) from None
     named = protocol.marked.get(("rig",))
-    if not isinstance(named, str) or not named:
+    if not isinstance(named, str) or not named or ("rig",) in protocol.marked.refused:
         return None
     path = protocol.path.parent / named
     plain = Path(os.path.normpath(path))
     try:
         # ".." behind a linked folder is not what it looks like.
         path = plain if plain.exists() or not path.exists() else path
-        return _File(path, read_yaml(_bytes(path)))
+        return _File(path, read_yaml(yaml_bytes(path)))
     except InputError as error:
         protocol.add(("rig",), error.problems[0])
     except (OSError, ValueError):
         protocol.add(("rig",), f"{named!r}; allowed: the path of a rig file")
     return None
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        with path.open("rb") as file:
-            return file.read(MAX_BYTES + 1)
-    except FileNotFoundError:
-        problem = f"no such file; {_near(path)}"
-    except IsADirectoryError:
-        problem = f"is a folder; allowed: a YAML file; {_near(path / 'x.yaml')}"
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        problem = f"cannot be read: {reason}; check its name and permissions"
-    raise InputError(f"{printable(str(path))}: {problem}")
-
-
-def _near(path: Path) -> str:
-    """Files in the folder of a missing one, those of a similar name if there are such."""
-    try:
-        names = sorted(p.name for p in path.parent.iterdir() if p.is_file())
-    except OSError:
-        return f"there is no folder {printable(str(path.parent))} to be read either"
-    yaml_names = [name for name in names if name.endswith((".yaml", ".yml"))]
-    stems = {name.rpartition(".")[0]: name for name in yaml_names}
-    close = [stems[stem] for stem in difflib.get_close_matches(path.stem, stems, n=3)]
-    there = ", ".join(map(printable, close or yaml_names[:8])) or "no YAML file"
-    return f"in {printable(str(path.parent))} there is {there}"
 
 
 def _report(*files: _File) -> list[str]:
@@ -199,7 +172,7 @@ class _Schema:
         missing = list(self._missing_axes())
         for item in error.errors(include_url=False):
             path = _path(item["loc"], self.marked.data, item["type"])
-            if not any(path[: len(refused)] == refused for refused in self.marked.refused):
+            if not any(path[:depth] in self.marked.refused for depth in range(len(path) + 1)):
                 missing += self._note(path, item["type"], item)
         for path in missing:
             # A key that is there under a misspelt name has been reported as such.
@@ -307,6 +280,8 @@ class _Schema:
             keys = node.get("properties") or node.get("propertyNames", {}).get("enum")
             one = "blocks" if many else "a block"
             return one + (f" with {', '.join(keys)}" if keys else " of names and numbers")
+        if kind == "string" and "description" in node:
+            return str(node["description"])
         if kind == "string":
             length = f" of 1 to {node['maxLength']} characters" if "maxLength" in node else ""
             return ("texts" if many else "text") + length
@@ -330,6 +305,7 @@ _TOO = {
     "too_short": "is too short",
     "too_long": "is too long",
     "literal_error": "is none of these",
+    "string_pattern_mismatch": "has more than one line, or another form",
 }
 
 

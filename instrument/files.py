@@ -1,10 +1,11 @@
-"""Files that are written whole or not at all, and what to say when a disk does not take them."""
+"""Files: written whole or not at all, read only where they are files; what a refusal means."""
 
 from __future__ import annotations
 
 import errno
 import os
 import shutil
+import stat
 from pathlib import Path
 
 from instrument.errors import StorageError
@@ -20,8 +21,9 @@ def write_whole(path: Path, content: str | bytes) -> None:
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
+        part.unlink(missing_ok=True)  # whatever stands there may lead elsewhere
         data = content if isinstance(content, bytes) else content.encode("utf-8", "replace")
-        with part.open("wb") as file:
+        with part.open("xb") as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
@@ -74,3 +76,17 @@ def make_folder(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for path in missing:
         sync_folder(path.parent)
+
+
+def read_file(path: Path, most_bytes: int, *, pipe: bool = False) -> bytes:
+    """What a file holds, up to one byte more than `most_bytes`; `pipe`: it may be a pipe, too.
+
+    A path may come from a stranger. A device or a pipe would be waited for, perhaps for ever, and
+    opening some devices does something by itself: they are refused unopened. Raises `OSError`, and
+    `ValueError` for a path that can be none.
+    """
+    mode = path.stat().st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or (pipe and stat.S_ISFIFO(mode))):
+        raise OSError(errno.EINVAL, "it is no file but a device, a pipe or a socket")
+    with path.open("rb") as file:
+        return file.read(most_bytes + 1)

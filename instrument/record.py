@@ -20,11 +20,18 @@ from typing import Any
 
 from instrument.closing import Closing
 from instrument.devices import Frame
-from instrument.errors import InputError, StorageError
+from instrument.errors import GonioError, InputError, StorageError
 from instrument.files import full, make_folder, sync_folder, trouble
 from instrument.mounts import network_share
 from instrument.reading import Check, Preview, Reading
-from instrument.record_schema import MARKS, SCHEMA_VERSION, begin, connect
+from instrument.record_schema import KINDS, MARKS, SCHEMA_VERSION, TABLES, begin, connect
+from instrument.untrusted_record import (
+    NOT_BEGUN,
+    check_files,
+    check_schema,
+    check_values,
+    only_tables,
+)
 
 FILE_NAME = "record.sqlite"
 LOCK_NAME = ".scanning"
@@ -66,19 +73,34 @@ class Record(Closing):
         path = folder / FILE_NAME
         if not path.is_file():
             raise InputError(f"{folder}: no {FILE_NAME} there: name the folder of a run")
+        check_files(folder, FILE_NAME, LOCK_NAME)
         try:
             record = cls(connect(path), folder)
-            version = record._begun_with()
-        except sqlite3.Error as error:
-            if _name_of(error).startswith(_CLOSED_TO_US):
-                raise StorageError(f"{path}: {_trouble(error, folder)}") from error
-            raise InputError(f"{path}: not a record of this program: {error}") from error
+        except (sqlite3.Error, UnicodeDecodeError) as error:
+            raise _refused(error, path) from error
+        try:
+            record._check(path)
+        except (sqlite3.Error, UnicodeDecodeError) as error:  # names and texts of any bytes
+            record.close()
+            raise _refused(error, path) from error
+        except InputError:
+            record.close()
+            raise
+        return record
+
+    def _check(self, path: Path) -> None:
+        """Refuse a record that never began, is of another version, or that no scan wrote."""
+        if self._db.execute("SELECT COUNT(*) FROM sqlite_master").fetchone() == (0,):
+            raise InputError(f"{self.folder}: {NOT_BEGUN}")
+        only_tables(self._db, path)
+        version = self.meta("schema_version")
         if version != str(SCHEMA_VERSION):
             raise InputError(
                 f"{path}: schema version {version}; this program reads {SCHEMA_VERSION}: "
                 "use the version of the program that made the run"
             )
-        return record
+        check_schema(self._db, path, TABLES)
+        check_values(self._db, path, KINDS)
 
     @contextmanager
     def claimed(self) -> Iterator[None]:
@@ -213,16 +235,6 @@ class Record(Closing):
         """Time, kind and text of every event in order."""
         yield from self._db.execute("SELECT time_utc, kind, text FROM event ORDER BY id")
 
-    def _begun_with(self) -> str | None:
-        """The schema's version; `InputError` where the process died before it had begun."""
-        if self._db.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,):
-            self.close()
-            raise InputError(
-                f"{self.folder}: stopped before the record had begun, so nothing was measured: "
-                "remove the folder and run again"
-            )
-        return self.meta("schema_version")
-
     def _write(self, sql: str, row: Sequence[object]) -> None:
         with self._writing() as database:
             database.execute(sql, row)
@@ -249,6 +261,13 @@ class Record(Closing):
             same = False
         if not same:
             raise StorageError(f"{path}: {_fate(self._file)}")
+
+
+def _refused(error: Exception, path: Path) -> GonioError:
+    """Why a file cannot be opened as a record."""
+    if isinstance(error, sqlite3.Error) and _name_of(error).startswith(_CLOSED_TO_US):
+        return StorageError(f"{path}: {_trouble(error, path.parent)}")
+    return InputError(f"{path}: not a record of this program: {error}")
 
 
 def _same(one: os.stat_result, other: os.stat_result) -> bool:

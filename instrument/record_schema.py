@@ -6,8 +6,11 @@ import sqlite3
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
+from typing import get_args
 
-from instrument.reading import Reading
+from instrument.devices import Surface
+from instrument.reading import Kind, Reading
+from instrument.untrusted_record import restrain
 
 SCHEMA_VERSION = 3
 
@@ -33,6 +36,12 @@ MARKS = ", ".join("?" * len(_COLUMNS))
 """One `?` for each column of a reading."""
 
 
+_WORDS: dict[str, tuple[str, ...]] = {"kind": get_args(Kind), "surface": get_args(Surface)}
+
+KINDS = {f.name: _WORDS.get(f.name, str(f.type)) for f in fields(Reading)}
+"""What each column of a reading may hold: `int`, `float`, `str`, or one of the words."""
+
+
 def _reading_columns(key: str = "") -> str:
     """A reading as columns; a float may be unknown, and is NULL then."""
     rows = (
@@ -49,11 +58,15 @@ CREATE TABLE drift_at_resume (before_step INTEGER NOT NULL, expected REAL NOT NU
                               {_reading_columns()});
 """
 
+TABLES = _TABLES + _READINGS
+"""The SQL that makes all of them."""
+
 
 def connect(path: Path) -> sqlite3.Connection:
     """Open a file as a record: with a write-ahead log, each commit on disk when it returns."""
     database = sqlite3.connect(path)
     try:
+        restrain(database)
         database.execute("PRAGMA journal_mode=WAL")
         database.execute("PRAGMA synchronous=FULL")
     except sqlite3.Error:
@@ -66,7 +79,7 @@ def begin(database: sqlite3.Connection, meta: Mapping[str, str]) -> None:
     """All tables and the run's description in one transaction: a record is whole or none."""
     database.execute("BEGIN")
     with database:
-        for statement in (_TABLES + _READINGS).split(";"):
+        for statement in TABLES.split(";"):
             database.execute(statement)
         rows = {"schema_version": str(SCHEMA_VERSION), **meta}
         database.executemany("INSERT INTO meta VALUES (?, ?)", rows.items())

@@ -11,7 +11,8 @@ from pydantic_core import PydanticCustomError
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Name = Annotated[str, Field(min_length=1, max_length=200)]
+# In one line: a name is printed in prompts and tables.
+Name = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\n\t]*$")]
 
 
 class Section(BaseModel):

@@ -17,6 +17,8 @@ from typing import NamedTuple
 
 import yaml
 
+from instrument.plain_text import first_unfit
+
 KeyPath = tuple[str | int, ...]
 
 MAX_BYTES = 256 * 1024  # some 40 000 angles
@@ -295,9 +297,13 @@ class _Reader:
         if anchor is not None and not isinstance(event, yaml.AliasEvent):
             self.found.add(_mark(event), path, f"anchor &{anchor[:40]} is not read; take it out")
         text = getattr(event, "value", "")
-        if any("\ud800" <= letter <= "\udfff" for letter in text):
-            # An escape such as "\ud800" gives text that cannot be written to any file.
-            self.found.add(_mark(event), path, f"{text[:40]!r} holds half a character (\\ud800)")
+        unfit = first_unfit(text)
+        if unfit is not None:
+            # An escape such as "\ud800" gives text that cannot be written to any file, one such as
+            # "\x1b[2J" a command to the terminal that shows it.
+            half = "half a character" if "\ud800" <= unfit <= "\udfff" else "a control character"
+            what = f"{text[:40]!r} holds {half} ({repr(unfit)[1:-1]})"
+            self.found.add(_mark(event), path, f"{what}; take it out")
             self.found.refused.add(path)
 
 

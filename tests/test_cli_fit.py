@@ -86,7 +86,7 @@ def test_too_few_points_for_any_fit_end_with_5_and_their_json(tmp_path: Path) ->
     ("text", "words"),
     [
         (HEADER + "30,0,0,zero,0.001\n", ":2:8: brdf: 'zero' is text"),
-        (HEADER + "30,0,0,0.2,-1\n", ":2:12: u_brdf: -1 1/sr; allowed: more than 0 1/sr"),
+        (HEADER + "30,0,0,0.2,-1\n", ":2:12: u_brdf: -1 1/sr; allowed: 1e-15 to 1e15 1/sr"),
         (HEADER + "95,0,0,0.2,0.1\n", ":2:1: theta_i_deg: 95 deg; allowed: a number from 0 to 90"),
         (HEADER + "30,0,0,nan,0.1\n", ":2:8: brdf: 'nan' is not finite"),
         (HEADER + 2 * "30,0,0,0.2,0.1\n", ":3:1: theta_i_deg: the same three angles"),

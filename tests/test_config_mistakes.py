@@ -311,7 +311,7 @@ PROTOCOL_MISTAKES = {
     "rig with a name that no system takes": (
         "rig: rig.yaml",
         'rig: "a\\0b"',
-        "2:6: rig: 'a\\x00b': cannot be read: embedded null byte; check its name and permissions",
+        "2:6: rig: 'a\\x00b' holds a control character (\\x00); take it out",
     ),
     "keys called like forms": (
         "sigma_deg: 20",

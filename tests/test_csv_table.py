@@ -82,25 +82,25 @@ MISTAKES = {
         PLAIN,
         "0.25",
         "dark",
-        "2:12: brdf: 'dark' is text; allowed: a finite number of 1/sr",
+        "2:12: brdf: 'dark' is text; allowed: -1e15 to 1e15 1/sr",
     ),
     "text in quotes, behind spaces": (
         PLAIN,
         "0.25",
         '  "da""rk"',
-        "2:14: brdf: 'da\"rk' is text; allowed: a finite number of 1/sr",
+        "2:14: brdf: 'da\"rk' is text; allowed: -1e15 to 1e15 1/sr",
     ),
     "long text": (
         PLAIN,
         "0.25",
         "x" * 99,
-        f"2:12: brdf: '{'x' * 40}...' is text; allowed: a finite number of 1/sr",
+        f"2:12: brdf: '{'x' * 40}...' is text; allowed: -1e15 to 1e15 1/sr",
     ),
     "underscore": (
         PLAIN,
         "0.25",
         "1_0",
-        "2:12: brdf: '1_0' is text; allowed: a finite number of 1/sr",
+        "2:12: brdf: '1_0' is text; allowed: -1e15 to 1e15 1/sr",
     ),
     "decimal comma in quotes": (
         PLAIN,
@@ -115,9 +115,9 @@ MISTAKES = {
         "2:17: row: 6 fields; allowed: 5, as in the header (line 1)"
         " (decimal numbers take a point; text with a comma needs quotes)",
     ),
-    "nan": (PLAIN, "0.25", "nan", "2:12: brdf: 'nan' is not finite; allowed: a finite number"),
-    "infinite": (PLAIN, "0.25", "-inf", "2:12: brdf: '-inf' is not finite; allowed: a finite"),
-    "overflow": (PLAIN, "0.25", "1e999", "2:12: brdf: '1e999' is not finite; allowed: a finite"),
+    "nan": (PLAIN, "0.25", "nan", "2:12: brdf: 'nan' is not finite; allowed: -1e15 to"),
+    "infinite": (PLAIN, "0.25", "-inf", "2:12: brdf: '-inf' is not finite; allowed: -1e15 to"),
+    "overflow": (PLAIN, "0.25", "1e999", "2:12: brdf: '1e999' is not finite; allowed: -1e15 to"),
     "azimuth not finite": (
         PLAIN,
         "-20.5,0",
@@ -140,25 +140,25 @@ MISTAKES = {
         PLAIN,
         "0.25",
         "",
-        "2:12: brdf: is empty here, but not in every row; allowed: a finite number of 1/sr",
+        "2:12: brdf: is empty here, but not in every row; allowed: -1e15 to 1e15 1/sr",
     ),
     "u_brdf empty in one row": (
         PLAIN,
         "0.25,0.002",
         "0.25,",
-        "2:17: u_brdf: is empty here, but not in every row; allowed: more than 0 1/sr",
+        "2:17: u_brdf: is empty here, but not in every row; allowed: 1e-15 to 1e15 1/sr",
     ),
     "u_brdf zero": (
         PLAIN,
         "0.25,0.002",
         "0.25,0.0",
-        "2:17: u_brdf: 0.0 1/sr; allowed: more than 0 1/sr",
+        "2:17: u_brdf: 0.0 1/sr; allowed: 1e-15 to 1e15 1/sr",
     ),
     "u_brdf negative": (
         PLAIN,
         "0.25,0.002",
         "0.25,-2e-3",
-        "2:17: u_brdf: -2e-3 1/sr; allowed: more than 0 1/sr",
+        "2:17: u_brdf: -2e-3 1/sr; allowed: 1e-15 to 1e15 1/sr",
     ),
     "incidence past 90": (
         PLAIN,
@@ -372,6 +372,7 @@ def test_a_file_that_cannot_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise PermissionError(13, os.strerror(13))
 
+    Path("secret.csv").touch()
     monkeypatch.setattr(Path, "open", refuse)
     words = "secret.csv: cannot be read: Permission denied; check its name and permissions"
     assert problem("secret.csv") == words

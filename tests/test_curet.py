@@ -93,7 +93,7 @@ TABLE_MISTAKES = {
     "not finite": (
         "3.141593",
         "     inf",
-        "2:20: phi_v: 'inf' is not finite; allowed: a finite number of rad",
+        "2:20: phi_v: 'inf' is not finite; allowed: a number from -1e6 to 1e6 rad",
     ),
     "past 90 degrees": (
         "1.570797",
@@ -129,8 +129,12 @@ def test_a_mistake_in_the_directions(kind: str) -> None:
 
 
 VALUE_MISTAKES = {
-    "text": ("0.100", "0,100", "1:11: v2: '0,100' is text; allowed: a finite number of 1/sr"),
-    "not finite": ("0.100", "  nan", "1:13: v2: 'nan' is not finite; allowed: a finite number of"),
+    "text": (
+        "0.100",
+        "0,100",
+        "1:11: v2: '0,100' is text; allowed: -1e15 to 1e15 1/sr (write 0.100)",
+    ),
+    "not finite": ("0.100", "  nan", "1:13: v2: 'nan' is not finite; allowed: -1e15 to 1e15"),
     "too few": (
         "  0.050",
         "",
