@@ -88,8 +88,11 @@ def print_plan(loaded: Loaded, plan: Plan) -> None:
         table.add_row(*row)
     out.print(table)
     lamp = Table("lamp", "theta_i (deg)", "dphi (deg)", "points", "view angles (deg)")
+    seen: dict[int, list[float]] = {}
+    for step in plan.points:
+        seen.setdefault(step.lamp_setting, []).append(step.pose.theta_r)
     for number, theta_i, dphi in lamp_settings(plan):
-        views = [s.pose.theta_r for s in plan.points if s.lamp_setting == number]
+        views = seen.get(number, [])
         span = f"{min(views):g} … {max(views):g}" if views else ""
         lamp.add_row(str(number + 1), f"{theta_i:g}", f"{dphi:g}", str(len(views)), span)
     out.print(lamp)

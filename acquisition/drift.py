@@ -7,9 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from instrument.geometry import FloatArray
 from instrument.reading import Check, Reading
+
+IntArray = NDArray[np.int64]
 
 LEAST_SIGNAL_U = 10.0  # a check with less signal than this many u follows noise and not the lamp
 JUMP_U, LEAST_JUMP = 4.0, 0.003  # a lamp has jumped when it is off by more than both of these
@@ -42,9 +45,15 @@ class _Stretch:
         inside = float(np.interp(time_s, self.times_s, self.level))
         return inside + self.slope_per_s * self.outside_s(time_s)
 
-    def shares(self, time_s: float) -> FloatArray:
-        """How much each check counts for a value at that time."""
-        return np.array([np.interp(time_s, self.times_s, row) for row in np.eye(self.level.size)])
+    def between(self, times_s: FloatArray) -> tuple[IntArray, FloatArray]:
+        """The check before each time, and how much the next one counts beside it (0 to 1)."""
+        last = self.times_s.size - 1
+        before = np.clip(np.searchsorted(self.times_s, times_s, side="right") - 1, 0, last)
+        after = np.minimum(before + 1, last)
+        apart_s = self.times_s[after] - self.times_s[before]
+        since_s = np.clip(times_s - self.times_s[before], 0.0, apart_s)
+        share = np.divide(since_s, apart_s, out=np.zeros(times_s.size), where=apart_s > 0)
+        return before.astype(np.int64), share
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,19 +104,25 @@ class Drift:
         u_relative = math.hypot(float(last.u_relative[-1]), self.u_beyond(time_s))
         return self.first_rate * last.at(time_s), u_relative
 
-    def shifts(self, time_s: float) -> FloatArray:
-        """What one standard deviation of each check's noise does to a value corrected by `at`.
+    @property
+    def u_relative(self) -> FloatArray:
+        """Relative standard uncertainty of every check, of its noise alone."""
+        return np.concatenate([[], *(s.u_relative for s in self.stretches)])
 
-        Relative; a value between two checks has a part of both, and every value the opposite of
-        the first one's, to which the levels are referred.
+    def between(self, times_s: FloatArray) -> tuple[IntArray, FloatArray]:
+        """The check before each time (N,), numbered through the block, and the next one's share.
+
+        The share (0 to 1) is that in the level at the time; the rest is the earlier one's. There
+        must be a check.
         """
-        own = self._stretch(time_s)
-        parts = [s.shares(time_s) if s is own else np.zeros(s.level.size) for s in self.stretches]
-        shares = np.concatenate([[], *parts])
-        if shares.size:
-            shares[0] -= 1.0
-        u_relative: FloatArray = np.concatenate([[], *(s.u_relative for s in self.stretches)])
-        return -shares * u_relative
+        before, share = self.stretches[0].between(times_s)
+        passed = self.stretches[0].level.size
+        for stretch in self.stretches[1:]:
+            own, part = stretch.between(times_s)
+            begun = stretch.times_s[0] < times_s
+            before, share = np.where(begun, own + passed, before), np.where(begun, part, share)
+            passed += stretch.level.size
+        return before, share
 
     def _stretch(self, time_s: float) -> _Stretch | None:
         """The one that began last before that time."""

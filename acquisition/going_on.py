@@ -30,7 +30,8 @@ class SoFar:
 
     def missing(self, plan: Plan) -> tuple[Step, ...]:
         """The steps that are still to be read, in order."""
-        return tuple(step for step in plan.steps if step.index not in self.done)
+        done = self.done
+        return tuple(step for step in plan.steps if step.index not in done)
 
     def drift_step(self, plan: Plan, block: int) -> Step | None:
         """The step of a block's last usable drift check: what a check repeats."""

@@ -95,7 +95,10 @@ class Positioner:
         self.surface = surface
 
     def make_safe(self) -> None:
-        """Stop every axis and shut the lamp off, even when one of them fails to answer."""
+        """Stop every axis and shut the lamp off, even when one of them fails to answer.
+
+        A Ctrl-C meanwhile asks for what is being done: it is done to the end, and noted.
+        """
         safe: list[tuple[str, Callable[[], None]]] = [
             (name, self._axes[name].stop) for name in AXES if name in self._axes
         ]
@@ -103,6 +106,14 @@ class Positioner:
             safe.append(("lamp", self._lamp.darken))
         for name, action in safe:
             try:
-                action()
-            except (DeviceError, OSError) as error:
-                log.error("%s could not be made safe: %s", name, error)
+                _made_safe(name, action)
+            except KeyboardInterrupt:
+                log.error("%s: Ctrl-C while it was made safe: made safe once more", name)
+                _made_safe(name, action)  # the stop may not have gone out
+
+
+def _made_safe(name: str, action: Callable[[], None]) -> None:
+    try:
+        action()
+    except (DeviceError, OSError) as error:
+        log.error("%s could not be made safe: %s", name, error)

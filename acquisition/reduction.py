@@ -156,19 +156,31 @@ def _placements(readings: Sequence[Reading]) -> list[int]:
     return [int(n) for n in np.cumsum(changes)]
 
 
-def _drift_noise(points: Sequence[Reading], drifts: Mapping[int, Drift]) -> list[SharedError]:
-    """The noise of every drift check, which all points corrected with it share."""
-    errors = []
-    for block, drift in drifts.items():
-        shifts = np.array(
-            [
-                drift.shifts(p.time_s) if p.block == block else np.zeros(drift.level.size)
-                for p in points
-            ]
-        ).reshape(len(points), drift.level.size)
-        together = np.zeros(len(points), dtype=np.int64)
-        errors += [SharedError(DRIFT, column, together) for column in shifts.T]
-    return errors
+def _drift_noise(points: Sequence[Reading], drifts: Mapping[int, Drift]) -> tuple[SharedError, ...]:
+    """The noise of the drift checks: each is shared by the points between its neighbours.
+
+    A point has a part of the check before it and of the one after: one of these has an even
+    number, the other an odd one, so two errors hold all of them. The third is that of its block's
+    first check, to which the levels of the whole block are referred, with the opposite sign.
+    """
+    if not any(drift.level.size for drift in drifts.values()):
+        return ()
+    u_relative = np.zeros((3, len(points)))
+    check = np.zeros((3, len(points)), dtype=np.int64)
+    block, time_s = (np.array([getattr(p, n) for p in points]) for n in ("block", "time_s"))
+    passed = 0
+    for number, drift in drifts.items():
+        own = np.flatnonzero(block == number)
+        if drift.level.size and own.size:
+            u, (before, share) = drift.u_relative, drift.between(time_s[own])
+            after = np.minimum(before + 1, u.size - 1)
+            u_relative[0, own], check[0, own] = u[0], passed
+            for made, part in ((before, 1.0 - share), (after, share)):
+                row = np.where(made == 0, 0, 1 + made % 2)
+                u_relative[row, own] -= part * u[made]
+                check[row, own] = passed + made
+        passed += drift.level.size
+    return tuple(SharedError(DRIFT, u, group) for u, group in zip(u_relative, check, strict=True))
 
 
 def _shared_by_tile(

@@ -7,11 +7,14 @@ generalised least squares).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array, csr_array, hstack
 
 from analysis.measurements import IntArray, Measurements
 from instrument.geometry import FloatArray, Geometry
@@ -19,6 +22,9 @@ from instrument.geometry import FloatArray, Geometry
 Brdf = Callable[[Geometry], FloatArray]
 
 LAMP_LEVEL = "lamp level"
+Columns = FloatArray | csr_array
+
+_MOST_FULL = 100_000  # entries of a full array; of more, few are not 0
 _ANY_LEVEL = 1.0  # relative u of a level that is not known at all
 
 
@@ -27,14 +33,16 @@ class Covariance:
     """C = diag(variance) + common common^T of N points with K shared errors.
 
     variance: (N,), independent variances, positive, in the square of the data's unit.
-    common: (N, K), standard shifts by each shared error, in the data's unit.
+    common: (N, K), standard shifts by each shared error, in the data's unit; sparse for a long
+        scan, of which a full array would fill the memory.
     names: what each shared error is, in words; empty where nobody has named them.
     """
 
     variance: FloatArray
-    common: FloatArray
+    common: Columns
     names: tuple[str, ...] = ()
-    _basis: FloatArray = field(init=False, repr=False)
+    _own: Columns = field(init=False, repr=False)
+    _vectors: FloatArray = field(init=False, repr=False)
     _shrink: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -42,31 +50,35 @@ class Covariance:
             raise ValueError(
                 f"variance = {self.variance.min():g}; allowed: finite, more than 0 for every point"
             )
-        # In units of the independent errors C is 1 + V V^T; with the singular values S and the
-        # left vectors Q of V its inverse root is 1 - Q (1 - 1 / sqrt(1 + S^2)) Q^T. The same
-        # chi2 as from a Cholesky factor, at the cost of N K^2 and without a matrix of N x N.
-        Q, S, _ = np.linalg.svd(
-            self.common / np.sqrt(self.variance)[:, np.newaxis], full_matrices=False
-        )
-        object.__setattr__(self, "_basis", Q)
-        object.__setattr__(self, "_shrink", 1 - 1 / np.sqrt(1 + S * S))
+        # In units of the independent errors C is 1 + V V^T, and with V^T V = W diag(s) W^T its
+        # inverse root is 1 - V W diag((1 - 1 / sqrt(1 + s)) / s) W^T V^T. The same chi2 as from
+        # a Cholesky factor of C, at the cost of K^3 and without a matrix of N x N.
+        V = _scaled(self.common, 1 / np.sqrt(self.variance))
+        s, W = np.linalg.eigh(_product(V.T, V))
+        root = np.sqrt(1 + np.maximum(s, 0.0))
+        object.__setattr__(self, "_own", V)
+        object.__setattr__(self, "_vectors", W)
+        object.__setattr__(self, "_shrink", 1 / (root * (1 + root)))
 
     def whiten(self, x: FloatArray) -> FloatArray:
         """C^(-1/2) x for x of shape (N,) or (N, M): residuals become independent with u = 1."""
         scale = np.sqrt(self.variance)
-        y = x / (scale if x.ndim == 1 else scale[:, np.newaxis])
+        return self._unshared(x / (scale if x.ndim == 1 else scale[:, np.newaxis]))
+
+    def _unshared(self, y: FloatArray) -> FloatArray:
+        """(1 + V V^T)^(-1/2) y, of y in units of the independent errors."""
         if self.common.shape[1] == 0:
             return np.asarray(y)
-        inner = self._basis.T @ y
-        shrink = self._shrink if x.ndim == 1 else self._shrink[:, np.newaxis]
-        return np.asarray(y - self._basis @ (shrink * inner))
+        inner = self._vectors.T @ (self._own.T @ y)
+        shrink = self._shrink if y.ndim == 1 else self._shrink[:, np.newaxis]
+        return np.asarray(y - self._own @ (self._vectors @ (shrink * inner)))
 
     def pulls(self, residual: FloatArray) -> FloatArray:
         """The likeliest value of each shared error behind a residual (N,), in units of its u, (K,).
 
         The mean of the errors' normal distribution given the residual: common^T C^-1 residual.
         """
-        return np.asarray(self.whiten(self.common).T @ self.whiten(residual))
+        return np.asarray(self._own.T @ self._unshared(self.whiten(residual)))
 
     def of(self, points: NDArray[np.bool_]) -> Covariance:
         """Covariance of some of the points (N,)."""
@@ -75,7 +87,7 @@ class Covariance:
     @property
     def u_total(self) -> FloatArray:
         """Standard uncertainty of each point, (N,): the root of C's diagonal."""
-        return np.asarray(np.sqrt(self.variance + np.square(self.common).sum(axis=1)))
+        return np.asarray(np.sqrt(self.variance + (self.common * self.common).sum(axis=1)))
 
     @property
     def u_independent(self) -> FloatArray:
@@ -84,7 +96,27 @@ class Covariance:
 
     def matrix(self) -> FloatArray:
         """C in full, (N, N)."""
-        return np.asarray(np.diag(self.variance) + self.common @ self.common.T)
+        return np.asarray(np.diag(self.variance) + _product(self.common, self.common.T))
+
+
+def _scaled(columns: Columns, by: FloatArray) -> Columns:
+    """Each row (N, K) times its own factor (N,)."""
+    if isinstance(columns, np.ndarray):
+        return np.asarray(columns * by[:, np.newaxis])
+    return columns.multiply(by[:, np.newaxis]).tocsr()
+
+
+def with_column(columns: Columns, column: FloatArray) -> Columns:
+    """One shared error (N,) more."""
+    if isinstance(columns, np.ndarray):
+        return np.column_stack([columns, column])
+    return csr_array(hstack([columns, csr_array(column[:, np.newaxis])]))
+
+
+def _product(left: Any, right: Any) -> FloatArray:
+    """The matrix product in full, of full or sparse arrays (scipy's types do not mix them)."""
+    product = left @ right
+    return np.asarray(product if isinstance(product, np.ndarray) else product.toarray(), np.float64)
 
 
 def independent(measurements: Measurements) -> Covariance:
@@ -136,36 +168,40 @@ def shared(
         variance = variance + np.square(alone)
         columns.append(several)
         names += [f"{name}{label}" for label in labels]
-    return Covariance(variance, np.concatenate(columns, axis=1), _told_apart(names))
+    common = csr_array(hstack(columns))
+    few = common.shape[0] * common.shape[1] <= _MOST_FULL
+    return Covariance(variance, common.toarray() if few else common, _told_apart(names))
 
 
 def _columns(
     shift: FloatArray, group: IntArray | FloatArray
-) -> tuple[FloatArray, FloatArray, list[str]]:
+) -> tuple[FloatArray, csc_array, list[str]]:
     """Shifts (N,) of points that share theirs with none; a column and a label a larger group.
 
     The points of a group have the same number in `group`, or the same angle in degrees.
     """
     values, member, count = np.unique(group, return_inverse=True, return_counts=True)
     alone = count[member] == 1
-    if not np.any(shift):
-        return np.zeros_like(shift), np.zeros((shift.size, 0)), []
-    several = np.flatnonzero(count > 1)
-    columns = np.where(member[:, np.newaxis] == several, shift[:, np.newaxis], 0.0)
+    several = np.flatnonzero((count > 1) & (np.bincount(member, np.abs(shift)) > 0))
+    column = np.full(values.size, -1)
+    column[several] = np.arange(several.size)
+    rows = np.flatnonzero(column[member] >= 0)
+    places = (rows, column[member[rows]])
+    columns = csc_array((shift[rows], places), shape=(shift.size, several.size))
     if np.issubdtype(group.dtype, np.floating):
         labels = [f" at {value:g} degrees" for value in values[several]]
     else:
-        labels = [f" {n + 1}" for n in range(several.size)] if several.size > 1 else [""]
-    return np.where(alone, shift, 0.0), columns, labels[: several.size]
+        labels = [f" {value + 1}" if values.size > 1 else "" for value in values[several]]
+    return np.where(alone, shift, 0.0), columns, labels
 
 
 def _told_apart(names: list[str]) -> tuple[str, ...]:
     """Names that stand several times get a number each."""
     seen: dict[str, int] = {}
-    apart = []
+    apart, often = [], Counter(names)
     for name in names:
         seen[name] = seen.get(name, 0) + 1
-        apart.append(name if names.count(name) == 1 else f"{name} {seen[name]}")
+        apart.append(name if often[name] == 1 else f"{name} {seen[name]}")
     return tuple(apart)
 
 

@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
-from analysis.covariance import Brdf, change, shared
-from analysis.measurements import Measurements
+from analysis.covariance import Brdf, Covariance, change, shared, with_column
+from analysis.measurements import IntArray, Measurements
 from analysis.sweeps import in_plane, sweeps
-from instrument.geometry import FloatArray
 
 # A difference less probable than this is one of the surface.
 UNLIKELY = 1e-3
@@ -63,17 +62,18 @@ def symmetry(m: Measurements, smooth: Brdf, noise: float) -> Symmetry:
     pairs = _pairs(m)
     if not pairs:
         return Symmetry("not tested", 0, 0.0, 1.0)
-    lamp, mirror = np.array(pairs).T
+    lamp, mirror = np.array(pairs, dtype=np.int64).T
     difference = m.brdf[lamp] - m.brdf[mirror]
     total = m.brdf[lamp] + m.brdf[mirror]
-    chi2 = float(difference @ np.linalg.solve(_covariance(m, smooth, noise, pairs), difference))
+    white = _covariance(m, smooth, noise, lamp, mirror).whiten(difference)
+    chi2 = float(white @ white)
     probability = float(chdtrc(float(len(pairs)), chi2))
     says = "rough" if probability < UNLIKELY else "smooth"
     return Symmetry(says, len(pairs), float(np.mean(difference) / np.mean(total)), probability)
 
 
 def _pairs(m: Measurements) -> list[tuple[int, int]]:
-    """Places of the points on the lamp's side, and of their twins on the mirror side."""
+    """Places of the points on the lamp's side, and of their twins on the mirror side, each once."""
     _, views = in_plane(m)
     found = []
     for theta_i, dphi, points in sweeps(m):
@@ -81,28 +81,30 @@ def _pairs(m: Measurements) -> list[tuple[int, int]]:
             continue
         towards = 1.0 if dphi < 90 else -1.0  # the sign of theta_r on the lamp's side
         sides = towards * views[points]
+        free = np.ones(sides.size, dtype=bool)
         for k in np.flatnonzero(sides > _SAME):
-            twin = int(np.argmin(np.abs(sides + sides[k])))
-            if abs(sides[twin] + sides[k]) < _SAME:
+            apart = np.where(free, np.abs(sides + sides[k]), np.inf)
+            twin = int(np.argmin(apart))
+            if apart[twin] < _SAME:
+                free[twin] = False
                 found.append((int(points[k]), int(points[twin])))
     return found
 
 
 def _covariance(
-    m: Measurements, smooth: Brdf, noise: float, pairs: list[tuple[int, int]]
-) -> FloatArray:
-    """Covariance of the differences, (P, P).
+    m: Measurements, smooth: Brdf, noise: float, lamp: IntArray, mirror: IntArray
+) -> Covariance:
+    """Covariance of the differences of P pairs; no point is in two of them.
 
     All theta_r may be off alike by u, too: a zero that is off shifts the two sides apart, which
     many points would show as asymmetry if the error of each were independent.
     """
-    D = np.zeros((len(pairs), m.size))
-    for n, (lamp, mirror) in enumerate(pairs):
-        D[n, lamp], D[n, mirror] = 1.0, -1.0
     if m.u_random is None:
-        return np.asarray(noise**2 * (D @ D.T))
+        return Covariance(np.full(lamp.size, 2 * noise**2), np.zeros((lamp.size, 0)))
     C = shared(m, smooth)
     turned = np.where(in_plane(m)[1] == m.theta_r_deg, 1.0, -1.0)
     zero = turned * change(m, smooth, theta_r=m.u_theta_r_deg)
-    common = D @ np.column_stack([C.common, zero])
-    return np.asarray((D * C.variance) @ D.T + common @ common.T)
+    return Covariance(
+        C.variance[lamp] + C.variance[mirror],
+        with_column(C.common[lamp] - C.common[mirror], zero[lamp] - zero[mirror]),
+    )

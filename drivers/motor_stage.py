@@ -111,16 +111,31 @@ class MotorStage(ABC):
 
     def homed(self) -> bool:
         """Whether the controller knows its reference, asked once the stage has come to rest."""
+        return self._at_rest(self.status()).homed
+
+    def _at_rest(self, now: Status) -> Status:
+        """The status once a stage that was stopped has come to rest."""
         ramp_s = self._limits.speed_deg_per_s / self._limits.acceleration_deg_per_s2
         until_s = self._clock.now_s() + ramp_s + STALLED_S
-        while (now := self.status()).moving:
+        while now.moving:
             if self._clock.now_s() > until_s:
                 raise DeviceError(
                     f"{self.name}: still moves {ramp_s + STALLED_S:.1f} s after it was stopped: "
                     "cut its power, then look at its controller"
                 )
             self._clock.sleep(POLL_S)
-        return now.homed
+            now = self.status()
+        return now
+
+    def _standing(self) -> Status:
+        """The status of a stage that may be told to move: one that moves is left alone."""
+        now = self.status()
+        if now.moving and not self._stopped:
+            raise DeviceError(
+                f"{self.name}: is on its way already, at {now.position_deg:g} deg: wait for its "
+                "end, or stop it first"
+            )
+        return self._at_rest(now)
 
     def settings(self) -> dict[str, str]:
         """The limits that hold, and what the controller says that it is set to."""
@@ -143,7 +158,7 @@ class MotorStage(ABC):
 
     def home(self) -> None:
         """Find the reference and stand at home; a controller that keeps it only goes there."""
-        now = self.status()
+        now = self._standing()
         self._refuse_fault(now)
         if now.homed and self.KEEPS_REFERENCE:
             self._apply_speed()
@@ -186,7 +201,7 @@ class MotorStage(ABC):
                 f"{self.name}: {angle_deg:g} deg asked for; its limits are {low:g} to {high:g} deg "
                 "(the device's own degrees): nothing has moved"
             )
-        now = self.status()
+        now = self._standing()
         self._refuse_fault(now)
         if not now.homed:
             raise DeviceError(f"{self.name}: not homed, so it must not move: home it first")

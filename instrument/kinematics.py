@@ -22,10 +22,10 @@ class Trapezoid:
 
     @property
     def duration_s(self) -> float:
-        """Seconds from rest to rest."""
-        if self.distance_deg == 0:
-            return 0.0
+        """Seconds from rest to rest; none over no way, or over one too short for a float's root."""
         top = self.acceleration_deg_per_s2 * self._ramp_s
+        if top == 0:
+            return 0.0
         return self._ramp_s + abs(self.distance_deg) / top
 
     def travelled_deg(self, time_s: float) -> float:

@@ -164,7 +164,7 @@ def bench(kind: str, patch: pytest.MonkeyPatch) -> MemoryBench:
         patch.setattr(f"drivers.{module}.time", clock)
     patch.setattr("drivers.motor_stage.Watchdog", _Unwatched)
     # Each question that is asked again is logged; what a test runner keeps of that is no leak.
-    patch.setattr(logging.Logger.manager, "disable", logging.WARNING)
+    patch.setattr(logging.Logger, "warning", lambda *_: None)
     patch.setattr("serial.serial_for_url", lambda *_, **__: port)
     patch.setattr("socket.create_connection", lambda *_, **__: port)
     patch.setattr("drivers.modbus_client._ready", port.ready)

@@ -10,8 +10,8 @@ from instrument.protocol_config import DriftCheck, References, WhiteTile
 SHRINK = 5
 
 
-def small_scan(rig: str = "bench_12bit") -> Loaded:
-    """The demo's foam on a rig file of configs, its camera with one pixel in 25."""
+def small_scan(rig: str = "bench_12bit", shrink: int = SHRINK) -> Loaded:
+    """The demo's foam on a rig file of configs, its camera with one pixel in 25 (or shrink^2)."""
     path = CONFIGS / "rigs" / f"{rig}.yaml"
     demo = load_protocol(CONFIGS / "protocols" / "demo.yaml", path)
     sweep = {
@@ -26,10 +26,10 @@ def small_scan(rig: str = "bench_12bit") -> Loaded:
     camera = demo.rig.camera
     small = camera.model_copy(
         update={
-            "width_px": camera.width_px // SHRINK,
-            "height_px": camera.height_px // SHRINK,
-            "axis_row_px": camera.axis_row_px / SHRINK,
-            "axis_column_px": camera.axis_column_px / SHRINK,
+            "width_px": camera.width_px // shrink,
+            "height_px": camera.height_px // shrink,
+            "axis_row_px": camera.axis_row_px / shrink,
+            "axis_column_px": camera.axis_column_px / shrink,
         }
     )
     return changed(demo, rig={"camera": small}, sweeps=[sweep], references=references)

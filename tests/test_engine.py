@@ -206,6 +206,31 @@ def test_an_axis_that_does_not_answer_keeps_no_other_from_being_stopped(
     assert calls[-1] == "theta_r.stop"
 
 
+def test_a_ctrl_c_while_the_rig_is_made_safe_keeps_nothing_from_being_stopped(
+    small: Loaded, record: Record
+) -> None:
+    devices, calls = open_devices(small), []
+
+    class Noting:
+        """Notes each stop when it is called; that of theta_i is interrupted the first time."""
+
+        def __init__(self, name: str) -> None:
+            self._name, self._axis = name, devices.axes[name]
+
+        def stop(self) -> None:
+            calls.append(self._name)
+            if calls == ["theta_i"]:
+                raise KeyboardInterrupt
+            self._axis.stop()
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(self._axis, name)
+
+    axes = {name: Noting(name) for name in devices.axes}
+    run(small, record, replace(devices, axes=axes))  # type: ignore[arg-type]  # stand-ins
+    assert calls == ["theta_i", "theta_i", "dphi", "theta_r"]
+
+
 def test_an_axis_that_stands_elsewhere_than_asked_ends_the_scan(
     small: Loaded, record: Record
 ) -> None:

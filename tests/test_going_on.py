@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import changed
 from small_scan import small_scan
@@ -140,7 +141,8 @@ def test_levels_after_a_jump_refer_to_the_first_check_of_all(whole: list[Reading
     plain = Drift.of(whole, 0)
     assert plain.level[0] == 1.0
     assert plain.at(drifts[1].time_s) == pytest.approx(plain.level[1])
-    assert len(plain.shifts(drifts[1].time_s)) == len(drifts)
+    before, share = plain.between(np.array([drifts[1].time_s]))
+    assert (before.tolist(), share.tolist()) == ([1], [0.0])
 
 
 def test_a_stage_that_kept_its_reference_is_not_homed_again(

@@ -21,6 +21,12 @@ def test_a_long_move_cruises_and_a_short_one_does_not() -> None:
     assert Trapezoid(0.0, 20.0, 40.0).duration_s == 0.0
 
 
+def test_a_way_too_short_for_a_floats_root_takes_no_time() -> None:
+    least = Trapezoid(5e-324, 20.0, 40.0)  # the smallest float there is
+    assert least.duration_s == 0.0
+    assert least.travelled_deg(1.0) == 0.0
+
+
 @given(DISTANCE, RATE, RATE)
 def test_it_starts_at_rest_ends_at_the_target_and_never_exceeds_its_speed(
     distance: float, speed: float, acceleration: float

@@ -200,11 +200,21 @@ def test_a_reference_that_is_not_found_is_an_error_and_a_stop() -> None:
 
 def test_a_drive_that_is_not_ready_takes_no_move(at: Bench) -> None:
     stage = at.homed()
-    at.motor.move(170.0)
-    at.motor.hold()
+    at.drive._free = True  # its FREE input: the motor is without current
     with pytest.raises(DeviceError, match=r"not ready to move .* STOP and FREE"):
         stage.start_move(1.0)
     assert at.drive.triggers == 0
+
+
+def test_a_stage_on_its_way_is_left_alone(at: Bench) -> None:
+    stage = at.homed()
+    at.motor.move(170.0)
+    at.motor.hold()
+    for command in (lambda: stage.start_move(1.0), stage.home):
+        with pytest.raises(DeviceError, match=r"is on its way already, .* or stop it first"):
+            command()
+    assert at.drive.triggers == 0
+    assert at.motor.moving
 
 
 @pytest.mark.parametrize("kind", KINDS)
