@@ -163,6 +163,20 @@ def grab(
     _do("grab_frame", rig, protocol, theta_r_deg, exposure_s, out, json, module=_BENCH)
 
 
+@app.command()
+def bench(
+    out: Annotated[Path, typer.Option("--out", help="The folder to write, absent or empty.")],
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A minute instead of a quarter of an hour.")
+    ] = False,
+    maps: Annotated[
+        bool, typer.Option("--maps", help="Also map where methods fail; takes longer.")
+    ] = False,
+) -> None:
+    """Measure on this machine what accuracy costs, method by method, and chart it."""
+    _do("run_bench", out, quick, maps, module="acquisition.benchmark.command")
+
+
 def main() -> None:
     """Entry point of the `gonio` command."""
     stop_on_signals()

@@ -1,0 +1,40 @@
+"""The machine that a bench ran on, and the versions of what it ran with."""
+
+from __future__ import annotations
+
+import os
+import platform
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+_PACKAGES = ("gonio", "numpy", "scipy", "opencv-contrib-python-headless")
+
+
+def machine() -> dict[str, str]:
+    """Processor, cores, operating system, versions and date, by name."""
+    found = {
+        "processor": _processor(),
+        "cores": str(os.cpu_count() or "unknown"),
+        "system": f"{platform.system()} {platform.release()}, {platform.machine()}",
+        "Python": platform.python_version(),
+    }
+    found |= {package: _version(package) for package in _PACKAGES}
+    return found | {"date": datetime.now(UTC).isoformat(timespec="seconds")}
+
+
+def _processor() -> str:
+    """Its name as Linux tells it, or what Python knows."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return next(iter(names), "") or platform.processor() or "unknown"
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"

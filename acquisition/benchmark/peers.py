@@ -1,0 +1,168 @@
+"""Other programs for the same tasks, where they are installed: measured in the same run.
+
+lmfit fits with the same model, data and start. pySCATMECH and Mitsuba bring Lambert's law: what
+their way of evaluating a BRDF costs. A program that is missing, or that does not work here, is a
+line on the page.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+from importlib import metadata
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from instrument.geometry import FloatArray, Geometry
+
+Brdf = Callable[[Geometry], FloatArray]
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """A program, its package and what it is measured at.
+
+    `version` is None where it is missing; `problem` says why one that is there does not work.
+    """
+
+    name: str
+    package: str
+    task: str
+    version: str | None
+    problem: str = ""
+
+    @property
+    def line(self) -> str:
+        """What the page says of it."""
+        if self.version is None:
+            return (
+                f"{self.name}: not installed (pip install {self.package}); {self.task} not compared"
+            )
+        if self.problem:
+            return f"{self.name} {self.version}: does not work here, not compared: {self.problem}"
+        return f"{self.name} {self.version}: {self.task}"
+
+
+_PEERS = (
+    ("lmfit", "lmfit", "lmfit", "the fit"),
+    ("pySCATMECH", "pySCATMECH", "pySCATMECH", "evaluating a BRDF, one geometry a call"),
+    ("Mitsuba", "mitsuba", "mitsuba", "evaluating a BRDF, many geometries a call"),
+)
+
+
+def peers() -> tuple[Peer, ...]:
+    """All peers, installed or not."""
+    found = []
+    for name, module, package, task in _PEERS:
+        version = _version(module, package)
+        found.append(Peer(name, package, task, version, _problem(name) if version else ""))
+    return tuple(found)
+
+
+def installed(name: str) -> Peer | None:
+    """The peer of that name, or None where it is not installed or does not work."""
+    usable = (p for p in peers() if p.version is not None and not p.problem)
+    return next((p for p in usable if p.name == name), None)
+
+
+def _version(module: str, package: str) -> str | None:
+    if find_spec(module) is None:
+        return None
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "of unknown version"
+
+
+@cache
+def _problem(name: str) -> str:
+    """What keeps an installed program from giving a right answer; empty where nothing does."""
+    try:
+        found, right = _PROBES[name]()
+    # Whatever a foreign program dies of, the bench goes on, and the page says so.
+    except Exception as error:  # noqa: BLE001
+        return f"{type(error).__name__}: {error}"
+    return "" if abs(found - right) < 1e-3 else f"{found:g} in place of {right:g}"
+
+
+def _fits_a_number() -> tuple[float, float]:
+    low, high = np.zeros(1), np.ones(1)
+    found = lmfit_minimum(lambda x: np.array([x[0] - 0.25, 0.0]), np.array([0.5]), low, high)
+    return float(found[0]), 0.25
+
+
+def _knows_lambert(make: Callable[[float], Brdf]) -> tuple[float, float]:
+    geometry = Geometry.from_degrees(theta_i=[30.0], theta_r=[50.0], dphi=[70.0])
+    return float(make(0.5)(geometry)[0]), 0.5 / np.pi
+
+
+def lmfit_minimum(
+    residual: Callable[[FloatArray], FloatArray],
+    start: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+) -> FloatArray:
+    """Where lmfit's own default method (Levenberg-Marquardt in MINPACK) ends, within bounds."""
+    lmfit: Any = importlib.import_module("lmfit")
+    parameters = lmfit.Parameters()
+    names = [f"x{n}" for n in range(start.size)]
+    for name, value, least, most in zip(names, start, low, high, strict=True):
+        parameters.add(name, float(value), min=float(least), max=float(most))
+
+    def of(now: Any) -> FloatArray:
+        return residual(np.array([now[name].value for name in names]))
+
+    found = lmfit.minimize(of, parameters)
+    return np.array([found.params[name].value for name in names])
+
+
+def lambertian_peers(albedo: float) -> dict[str, Brdf]:
+    """Lambert's BRDF in 1/sr by the peers that are installed, by name."""
+    return {name: make(albedo) for name, make in _MAKERS.items() if installed(name) is not None}
+
+
+def _scatmech(albedo: float) -> Brdf:
+    module: Any = importlib.import_module("pySCATMECH.brdf")
+    model = module.BRDF_Model("Lambertian_BRDF_Model", reflectance=albedo)
+
+    def brdf(geometry: Geometry) -> FloatArray:
+        phi = np.pi - np.radians(geometry.dphi_deg)  # counted from the mirror side
+        angles = zip(geometry.theta_i, geometry.theta_r, phi, strict=True)
+        return np.array([model.BRDF(*map(float, angle)) for angle in angles])
+
+    return brdf
+
+
+def _mitsuba(albedo: float) -> Brdf:
+    mi: Any = importlib.import_module("mitsuba")
+    dr: Any = importlib.import_module("drjit")
+    mi.set_variant("llvm_ad_rgb")
+    bsdf = mi.load_dict({"type": "diffuse", "reflectance": {"type": "rgb", "value": albedo}})
+
+    def brdf(geometry: Geometry) -> FloatArray:
+        to_lamp, cos_r = _direction(geometry.theta_i, 0.0), np.cos(geometry.theta_r)
+        to_camera = _direction(geometry.theta_r, np.radians(geometry.dphi_deg))
+        at = dr.zeros(mi.SurfaceInteraction3f, geometry.theta_i.size)
+        at.wi = mi.Vector3f(*(mi.Float(a) for a in to_lamp))
+        seen = bsdf.eval(mi.BSDFContext(), at, mi.Vector3f(*(mi.Float(a) for a in to_camera)))
+        # Mitsuba's value has the cosine of the outgoing direction in it.
+        red = np.asarray(seen, dtype=np.float64).reshape(3, -1)[0]
+        return np.asarray(red / cos_r)
+
+    return brdf
+
+
+def _direction(theta: FloatArray, phi: FloatArray | float) -> tuple[FloatArray, ...]:
+    sine = np.sin(theta)
+    return sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)
+
+
+_MAKERS: dict[str, Callable[[float], Brdf]] = {"pySCATMECH": _scatmech, "Mitsuba": _mitsuba}
+_PROBES: dict[str, Callable[[], tuple[float, float]]] = {
+    "lmfit": _fits_a_number,
+    **{name: partial(_knows_lambert, make) for name, make in _MAKERS.items()},
+}
