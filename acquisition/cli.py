@@ -89,6 +89,10 @@ def fit(
     relative: Annotated[
         bool, typer.Option("--relative", help="The values are tied to no reference.")
     ] = False,
+    method: Annotated[
+        str,
+        typer.Option(help="For rough surfaces: auto, qualitative, functional or exact."),
+    ] = "auto",
     json: Json = False,
 ) -> None:
     """Find the simplest model that explains a run or a CSV table of BRDF.
@@ -98,7 +102,8 @@ def fit(
     parameters.
     """
     wanted = (format, sample, max_theta_deg, relative)
-    _do("fit_source", source, models, robust, json, *wanted, module="acquisition.fit_command")
+    asked = (source, models, robust, json, method, *wanted)
+    _do("fit_source", *asked, module="acquisition.fit_command")
 
 
 @app.command()

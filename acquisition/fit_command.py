@@ -13,11 +13,12 @@ from rich.table import Table
 
 from acquisition.console import out
 from acquisition.models import check_model
-from acquisition.remarks import VERDICTS, parameters_of, value_text
+from acquisition.remarks import VERDICTS, parameters_of, validity_note, value_text
 from acquisition.sources import Source, Wanted, read_source
 from analysis.choice import Choice, choose
 from analysis.fit import FitResult
 from analysis.fit_json import nothing, to_json
+from analysis.ladder import METHODS, MethodOfFit
 from instrument.errors import InputError, NotDetermined
 
 
@@ -26,17 +27,19 @@ def fit_source(
     models: str | None,
     robust: bool,
     as_json: bool,
+    method: str,
     *wanted: *tuple[str, int | None, float, bool],
 ) -> None:
     """Fit what is `wanted` of a source (the fields of `Wanted`) and print the outcome.
 
+    `method`: for the rough surface, one of `analysis.ladder.METHODS`.
     Raises `InputError` for what is wrong with it, and `NotDetermined`, after printing, where the
     data do not determine the chosen model's parameters, or are too few for any fit.
     """
-    names = _names(models)
+    names, way = _names(models), _method(method, models)
     try:
         source = read_source(path, Wanted(*wanted))
-        choice = choose(source.measurements, source.acceptance, names, robust)
+        choice = choose(source.measurements, source.acceptance, names, robust, way)
     except NotDetermined as error:
         if as_json:
             _print_json(nothing(str(error)))
@@ -60,6 +63,18 @@ def _names(models: str | None) -> list[str] | None:
     if len(set(names)) < len(names):
         raise InputError(f"--models: {models}: a model stands twice; name each once")
     return names
+
+
+def _method(method: str, models: str | None) -> MethodOfFit:
+    """How the rough surface is worked out. A model's name says its method."""
+    for known in METHODS:
+        if method == known:
+            if models is not None and known != "auto":
+                raise InputError(
+                    f"--method: {method}; allowed: auto, as --models names the methods"
+                )
+            return known
+    raise InputError(f"--method: {method}; allowed: {', '.join(METHODS)}")
 
 
 def _print_json(fit: dict[str, object]) -> None:
@@ -112,6 +127,9 @@ def _notes(source: Source, chosen: FitResult) -> list[str]:
             f"no u is stated: the noise is estimated from the residuals, {percent:.2g} % of the "
             "mean; every u rests on it"
         )
+    beyond = validity_note(chosen)
+    if beyond:
+        found.append(beyond)
     if m.relative:
         found.append("the values are relative: what only scales them is not determined")
     for k in np.flatnonzero(chosen.outliers)[:10]:

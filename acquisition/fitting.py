@@ -44,8 +44,11 @@ class Fitted:
 def fit_run(reduced: Reduced, loaded: Loaded) -> Fitted:
     """Fit the sound points; what keeps a fit from being made is said, not raised."""
     acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
+    asked = loaded.protocol.fit
     try:
-        choice = choose(measurements(reduced, loaded), acceptance, loaded.protocol.fit.models)
+        choice = choose(
+            measurements(reduced, loaded), acceptance, asked.models, method=asked.method
+        )
     except (NotDetermined, ValueError) as error:  # too few points, or none that shows light
         return Fitted(None, reduced.sound, str(error))
     return Fitted(choice, reduced.sound, choice.reason)

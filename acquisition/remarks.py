@@ -80,6 +80,7 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         _unfinished_note(record),
         _interruptions_note(record),
         fitted.reason if fitted.choice is not None else "",
+        validity_note(fitted.chosen) if fitted.chosen is not None else "",
         _hidden_note(record),
         _flag_note(reduced),
         _drift_note(reduced),
@@ -88,6 +89,18 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         tile,
     )
     return tuple(note for note in found if note)
+
+
+def validity_note(chosen: FitResult) -> str:
+    """At how many points the fitted model is beyond what it holds for, and why."""
+    holds = chosen.validity
+    beyond = int(np.sum(~holds.mask))
+    if not beyond:
+        return ""
+    return (
+        f"at {beyond} of {holds.mask.size} points the model is beyond what it holds for: "
+        f"{holds.reason}"
+    )
 
 
 def _hidden_note(record: Record) -> str:

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.acceptance import Acceptance
+from analysis.adequate import PHYSICS, cheapest
 from analysis.first_fit import FirstFit, deepened, determined, quick_fit
 from analysis.fit import FitResult, refined
 from analysis.ladder import SAME_PREDICTION, approximation
 from analysis.measurements import Measurements
 from analysis.models import MODELS
-from analysis.models.departure import departure
 from analysis.relative import NAME as RELATIVE_FACTOR
 from analysis.relative import levelled
 from instrument.errors import NotDetermined
@@ -87,15 +87,19 @@ def _leaves_integral(form: FirstFit, measurements: Measurements) -> bool:
     """Whether the functional form, as fitted, is off the integral by more than u/3 anywhere."""
     names = [p.name for p in form.problem.model.parameters]
     values = dict(zip(names, map(float, form.solution.x), strict=True))
-    geometry, albedo, sigma = measurements.geometry, values["albedo"], values["sigma_deg"]
-    rough = MODELS["oren_nayar"].brdf(geometry, albedo=albedo, sigma_deg=sigma)
+    at = {name: values[name] for name in ("albedo", "sigma_deg")}
+    rough = MODELS["oren_nayar"].brdf(measurements.geometry, **at)
     rough *= values.get(RELATIVE_FACTOR, 1.0)
-    off = np.abs(rough * departure("oren_nayar", geometry, albedo, sigma))
     u = measurements.u_random
     if u is None:
         left = form.problem.predict(form.solution.x) - measurements.brdf
         u = np.full(measurements.size, float(np.sqrt(np.mean(np.square(left)))))
-    return bool(np.any(off > SAME_PREDICTION * u))
+    allowed = np.divide(SAME_PREDICTION * u, np.abs(rough), out=np.ones_like(u), where=rough != 0)
+    # Data without noise may ask for more than even the integral keeps.
+    allowed = np.maximum(allowed, PHYSICS["rough"].accuracy(measurements.geometry))
+    ranges = {name: (value, value) for name, value in at.items()}
+    found = cheapest("rough", measurements.geometry, ranges, allowed, among=("functional",))
+    return found.method != "functional"
 
 
 def _hopeless(fit: FirstFit, best: FirstFit, m: Measurements) -> bool:

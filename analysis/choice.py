@@ -16,7 +16,7 @@ from analysis.acceptance import Acceptance
 from analysis.candidates import Candidates
 from analysis.fit import FitResult
 from analysis.held_out import folds, held_out
-from analysis.ladder import LADDER, RICH, SAME_PREDICTION, physics
+from analysis.ladder import LADDER, RICH, SAME_PREDICTION, MethodOfFit, of_method, physics
 from analysis.likelihood import LEAST_NOISE, UNLIKELY, probability
 from analysis.measurements import Measurements
 from analysis.structure import failures, runs_probability
@@ -55,19 +55,22 @@ def choose(
     acceptance: Acceptance | None = None,
     models: Sequence[str] | None = None,
     robust: bool = False,
+    method: MethodOfFit = "auto",
 ) -> Choice:
     """Fit every model and choose the simplest that explains the data as well as the best does.
 
     Without `models` they are those of the ladder, and where these do not explain the data the rich
-    ones too; an integrated model whose functional form is as good is then left out. Models with
-    too many parameters for the points are left out. Raises `NotDetermined` when too few points
-    leave none of them, `KeyError` for an unknown model.
+    ones too; an integrated model whose functional form is as good is then left out, unless a
+    `method` for the rough surface is asked for. Models with too many parameters for the points are
+    left out. Raises `NotDetermined` when too few points leave none of them, `KeyError` for an
+    unknown model.
     """
-    candidates = Candidates.of(models or LADDER, measurements, robust, every=models is not None)
+    names = of_method(models or LADDER, method)
+    candidates = Candidates.of(names, measurements, robust, every=models is not None)
     choice = _chosen(candidates, acceptance)
     if models is not None or _explained(choice):
         return choice
-    return _chosen(candidates.with_more(RICH), acceptance)
+    return _chosen(candidates.with_more(of_method(RICH, method)), acceptance)
 
 
 def _explained(choice: Choice) -> bool:

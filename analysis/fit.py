@@ -19,7 +19,7 @@ from analysis.first_fit import FirstFit, first_fit
 from analysis.likelihood import NOT_NORMAL, UNLIKELY, aicc, bic, noise_variance, probability
 from analysis.measurements import Measurements
 from analysis.models import MODELS, Model
-from analysis.models.base import BoolArray
+from analysis.models.base import BoolArray, Validity
 from analysis.problem import Problem
 from analysis.relative import levelled, relative, untied
 from analysis.uncertainty import uncertainty
@@ -73,6 +73,12 @@ class FitResult:
     def brdf(self, geometry: Geometry) -> FloatArray:
         """The fitted model in any geometry, in 1/sr, as it is without a rig's averaging."""
         return self.problem.plain(self.x, geometry)
+
+    @property
+    def validity(self) -> Validity:
+        """Where the fitted model holds among the points (N,), and why it does not elsewhere."""
+        values = dict(zip(self.u, map(float, self.x), strict=True))
+        return self.problem.model.validity(self.problem.geometry, **values)
 
 
 def fit(

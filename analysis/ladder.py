@@ -8,6 +8,12 @@ that does not follow Fresnel, light scattered inside.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Literal
+
+MethodOfFit = Literal["auto", "qualitative", "functional", "exact"]
+"""How a fit works out the rough surface; auto: as cheaply as the data allow."""
+
 LADDER = (
     "lambert",
     "oren_nayar_qualitative",
@@ -37,6 +43,10 @@ SAME_PREDICTION = 1 / 3
 # The rough diffuse surface by rising cost: one physics, three methods.
 _ROUGH = ("oren_nayar_qualitative", "oren_nayar", "oren_nayar_exact")
 _EXACT, _FUNCTIONAL = "oren_nayar_exact", "oren_nayar"
+_OF_METHOD = {
+    "qualitative": "oren_nayar_qualitative", "functional": _FUNCTIONAL, "exact": _EXACT,
+}  # fmt: skip
+METHODS: tuple[MethodOfFit, ...] = ("auto", "qualitative", "functional", "exact")
 
 
 def physics(name: str) -> str:
@@ -50,3 +60,12 @@ def approximation(name: str) -> str | None:
     if _EXACT not in terms:
         return None
     return "+".join(_FUNCTIONAL if term == _EXACT else term for term in terms)
+
+
+def of_method(names: Iterable[str], method: str) -> tuple[str, ...]:
+    """Candidates with the rough surface worked out by one method alone; "auto": all as they are."""
+    if method == "auto":
+        return tuple(names)
+    own = _OF_METHOD[method]
+    made = ("+".join(own if t in _ROUGH else t for t in name.split("+")) for name in names)
+    return tuple(dict.fromkeys(made))

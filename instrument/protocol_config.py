@@ -119,20 +119,31 @@ class References(Section):
 
 
 class Fit(Section):
-    """What to fit; the default is every model of the ladder."""
+    """What to fit; the default is every model of the ladder.
+
+    `method`: how the rough surface is worked out; auto: as cheaply as the data allow.
+    """
 
     models: Annotated[list[Name], Field(min_length=1)] | None = None
+    method: Literal["auto", "qualitative", "functional", "exact"] = "auto"
+
+    def mistakes(self) -> Iterator[tuple[str, str]]:
+        """A model's name says its method."""
+        if self.models is not None and self.method != "auto":
+            yield "method", f"{self.method}; allowed: auto, as `models` names the methods"
 
 
 class SimulatedSample(Section):
     """What the sample of a simulated rig really is: ignored by real rigs, never seen by the fit.
 
+    `method`: how its reflectance is worked out; auto: as cheaply as the picture allows.
     `mottling`: relative standard deviation of the albedo over the surface, in patches of
     `mottling_size_mm`.
     """
 
     model: Name
     parameters: dict[str, Finite]
+    method: Literal["auto", "exact"] = "auto"
     mottling: Annotated[float, Field(ge=0, le=0.3)] = 0.0
     mottling_size_mm: Annotated[float, Field(ge=0.2, le=1000)] = 2.0
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.models import MODELS
+from analysis.rendered import adequate_brdf
 from instrument.devices import Surface
 from instrument.geometry import FloatArray, Geometry
 from instrument.protocol_config import Protocol, SimulatedSample
@@ -69,6 +70,8 @@ class Scene:
     def brdf(self) -> Brdf:
         """Reflectance of the surface that stands there, in 1/sr."""
         if self.surface == "sample":
+            if self.sample.method == "auto":
+                return adequate_brdf(self.sample.model, self.sample.parameters)
             model, parameters = MODELS[self.sample.model], self.sample.parameters
             return lambda geometry: model.brdf(geometry, **parameters)
         albedo = self.tile_reflectance()

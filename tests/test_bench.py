@@ -243,6 +243,9 @@ class Watched:
     def identity(self) -> str:
         return self._camera.identity()
 
+    def settings(self) -> dict[str, str]:
+        return self._camera.settings()
+
     def set_exposure_s(self, exposure_s: float) -> float:
         return self._camera.set_exposure_s(exposure_s)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,20 @@ def test_a_person_reads_parameters_candidates_and_why(rough: Path) -> None:
     for words in ("oren_nayar: the simplest model", "sigma_deg", "±", "ΔBIC", "ΔAICc", "symmetry"):
         assert words in done.stdout
     assert "wolff" not in done.stdout
+
+
+def test_the_rough_surface_is_worked_out_as_asked(rough: Path) -> None:
+    done = gonio("fit", rough, "--method", "qualitative", "--json")
+    names = {c["model"] for c in json.loads(done.stdout)["candidates"]}
+    assert "oren_nayar_qualitative" in names
+    assert not names & {"oren_nayar", "oren_nayar_exact"}
+
+
+def test_where_the_model_does_not_hold_is_told(tmp_path: Path) -> None:
+    truth = {"albedo": 0.3, "sigma_deg": 20.0}
+    oblique = table(tmp_path / "oblique.csv", "oren_nayar", (45.0, 86.0), **truth)
+    done = gonio("fit", oblique, "--models", "oren_nayar")
+    assert re.search(r"at \d+ of \d+ points the model is beyond what it holds for", done.stdout)
 
 
 def test_none_adequate_is_a_result(rough: Path) -> None:
@@ -114,6 +129,8 @@ def test_mistakes_in_a_table_end_with_2_and_their_place(
         (("--max-theta-deg", "nan"), "--max-theta-deg: nan degrees"),
         (("--format", "xml"), "--format: xml; allowed: auto, run, csv, curet"),
         (("--sample", "3"), "--sample: 3 for the format csv"),
+        (("--method", "cubic"), "--method: cubic; allowed: auto, qualitative, functional, exact"),
+        (("--method", "exact", "--models", "lambert"), "--method: exact; allowed: auto, as"),
     ],
 )
 def test_wrong_options_are_named(rough: Path, options: tuple[str, ...], words: str) -> None:

@@ -175,11 +175,12 @@ def test_where_the_functional_model_ends() -> None:
             theta_i=[from_deg - 1, from_deg], theta_r=[1 - from_deg, -from_deg]
         )
         validity = model.validity(geometry, albedo=1e-6, sigma_deg=sigma_deg)
-        assert list(validity.mask) == [True, False]
+        assert not validity.mask.any()  # a degree earlier it is far off the integral already
         assert "negative" in validity.reason
+        assert "off the integral" in validity.reason
         assert list(model.brdf(geometry, albedo=1e-6, sigma_deg=sigma_deg) >= 0) == [True, False]
     grazing = Geometry.from_degrees(theta_i=90, theta_r=[89, 90])
-    assert list(model.validity(grazing, albedo=0.5, sigma_deg=30).mask) == [True, False]
+    assert not model.validity(grazing, albedo=0.5, sigma_deg=30).mask.any()
     assert model.validity(grazing, albedo=0.5, sigma_deg=0).mask.all()
 
 

@@ -51,8 +51,9 @@ from instrument.geometry import FloatArray, Geometry
 LIMIT_DEG = 85.0
 """Larger angles from the normal are not in the table: there the integral itself is less certain."""
 
-ERROR = 0.005
-"""What interpolation adds to a departure, at most; in 99 of 100 geometries it is below 0.001."""
+ERROR = 0.012
+"""What interpolation adds to a departure, at most: near the mirror direction with both angles at 84
+to 85 degrees (found: 0.0102). In 99 of 100 geometries it is below 0.001."""
 
 FILE = Path(__file__).with_name("departure.npz")
 

@@ -14,13 +14,21 @@ import math
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity, kept
+from analysis.models.base import BoolArray, Model, Parameter, Validity, kept
 from analysis.models.limits import GRAZING, NEGATIVE, both_graze, held
 from instrument.geometry import FloatArray, Geometry
 
 ALBEDO = Parameter("albedo", "1", 0.0, 1.0, 0.5, scale=True)
 SIGMA_DEG = Parameter("sigma_deg", "degrees", 0.0, 60.0, 20.0)
 
+PRINTED = 0.33
+"""The constant of C1 in (36): footnote 11 has another."""
+
+VALID = 0.2
+"""How far a printed form may be off the integral where it is said to hold."""
+
+_OFF = "more than a fifth off the integral: shadow, masking and interreflection beyond the fit"
+_UNKNOWN = "nearer to grazing than 85 degrees, where its departure from the integral is not mapped"
 _FORWARD = "forward, where (36) leaves out more than a fifth of itself: up to twice the integral"
 
 
@@ -36,7 +44,7 @@ def lambert_slopes(geometry: Geometry, albedo: float) -> dict[str, FloatArray]:
 
 
 def oren_nayar_qualitative_brdf(
-    geometry: Geometry, albedo: float, sigma_deg: float, constant: float = 0.33
+    geometry: Geometry, albedo: float, sigma_deg: float, constant: float = PRINTED
 ) -> FloatArray:
     """Oren and Nayar's qualitative BRDF in 1/sr: 1995, equation (36), over E0 cos(theta_i).
 
@@ -53,7 +61,7 @@ def oren_nayar_qualitative_brdf(
 
 
 def oren_nayar_qualitative_slopes(
-    geometry: Geometry, albedo: float, sigma_deg: float, constant: float = 0.33
+    geometry: Geometry, albedo: float, sigma_deg: float, constant: float = PRINTED
 ) -> dict[str, FloatArray]:
     """Derivatives of `oren_nayar_qualitative_brdf` by albedo, and by sigma in 1/degree."""
     sigma = math.radians(sigma_deg)
@@ -66,10 +74,13 @@ def oren_nayar_qualitative_slopes(
 
 
 def oren_nayar_qualitative_holds(
-    geometry: Geometry, albedo: float, sigma_deg: float, constant: float = 0.33
+    geometry: Geometry, albedo: float, sigma_deg: float, constant: float = PRINTED
 ) -> Validity:
-    """Where (36) keeps the terms that matter: not far forward, where (33) has a negative C2."""
-    del albedo  # where (36) holds does not depend on it
+    """Where (36) keeps the terms that matter: not far forward, where (33) has a negative C2.
+
+    And where it is, as printed, within a fifth of the integral, as far as that is mapped.
+    """
+    printed = constant == PRINTED
     sigma2 = math.radians(sigma_deg) ** 2
     A = 1 - 0.5 * sigma2 / (sigma2 + constant)
     left_out = -sigma2 / (sigma2 + 0.09) * roughness_terms(geometry)
@@ -77,6 +88,7 @@ def oren_nayar_qualitative_holds(
         geometry,
         ((geometry.cos_dphi < 0) & (left_out > 0.2 * A), _FORWARD),
         (both_graze(geometry) & (geometry.cos_dphi >= 0) & (sigma2 > 0), GRAZING),
+        *(_departures("oren_nayar_qualitative", geometry, albedo, sigma_deg) if printed else ()),
     )
 
 
@@ -116,12 +128,30 @@ def oren_nayar_slopes(geometry: Geometry, albedo: float, sigma_deg: float) -> di
 
 
 def oren_nayar_holds(geometry: Geometry, albedo: float, sigma_deg: float) -> Validity:
-    """Where (33) + (34) are a reflectance: not negative, and finite."""
+    """Where (33) + (34) are a reflectance, not negative and finite, and near the integral.
+
+    Near: within a fifth, as far as that is mapped.
+    """
     return held(
         geometry,
         (_relative_to_lambert(geometry, albedo, sigma_deg) < 0, NEGATIVE),
         (both_graze(geometry) & (sigma_deg > 0), GRAZING),
+        *_departures("oren_nayar", geometry, albedo, sigma_deg),
     )
+
+
+def _departures(
+    name: str, geometry: Geometry, albedo: float, sigma_deg: float
+) -> tuple[tuple[BoolArray, str], ...]:
+    """Where a form may be off the integral by more than VALID, or nobody knows, and why."""
+    # The bounds are made of this module's forms.
+    from analysis.methods_rough import closer_bound
+
+    if sigma_deg == 0:
+        return ()  # a plane: all forms are Lambert's law
+    ranges = {"albedo": (albedo, albedo), "sigma_deg": (sigma_deg, sigma_deg)}
+    bound = closer_bound(name, geometry, ranges)
+    return (np.isfinite(bound) & (bound > VALID), _OFF), (np.isinf(bound), _UNKNOWN)
 
 
 @kept

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.models.base import Model, Parameter, Validity
-from analysis.models.chandrasekhar import h_exact, log_h_slope, log_h_slope_by_mu
+from analysis.models.chandrasekhar import h_exact, h_order, log_h_slope, log_h_slope_by_mu
 from analysis.models.diffuse import (
     ALBEDO,
     SIGMA_DEG,
@@ -69,6 +69,7 @@ def wolff_brdf(
     single_scattering_albedo: float,
     n: float,
     epsilon: float | None = None,
+    order: int | None = None,
 ) -> FloatArray:
     """Wolff's BRDF in 1/sr: 1998, equations (7) and (8), over L_i cos(theta_i) d omega.
 
@@ -78,7 +79,7 @@ def wolff_brdf(
     azimuth. At n = 1 it is Chandrasekhar's law for a bare half-space. With an `epsilon` both F of
     (7), of theta_i and theta_r, are Wolff's polynomial (0.07 for most dielectrics; at n = 1.5
     that is 5 % darker at normal incidence, 12 % at 50/50 and 35 % at 70/70 degrees); varrho keeps
-    the exact one.
+    the exact one. With an `order` every H, in K too, is Chandrasekhar's of that order.
 
     Not quite reciprocal, as K depends on theta_r alone (errata). Largest difference between the
     two ways round, over all angles, at normal against grazing: for n = 1.5 it is 1.5 % at
@@ -88,7 +89,7 @@ def wolff_brdf(
     """
     rho = single_scattering_albedo
     mu = _both_refracted(geometry, n)
-    H, K = _h_and_k(mu, rho, n)
+    H, K = _h_and_k(mu, rho, n, order)
     varrho_1 = rho / (4 * np.pi * n * n) * H[0] * H[1] / (mu[0] + mu[1])
     return np.asarray(varrho_1 / (1 - K[1]) * _both_transmittances(geometry, n, epsilon))
 
@@ -129,7 +130,20 @@ def wolff_holds(geometry: Geometry, single_scattering_albedo: float, n: float) -
     return held(geometry, (both_graze(geometry) & scatters & (n == 1), _NO_INTERFACE))
 
 
-def internal_return(mu_ref: FloatArray, single_scattering_albedo: float, n: float) -> FloatArray:
+def ray_terms(
+    theta: FloatArray, single_scattering_albedo: float, n: float, order: int | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """H and 1 - K along rays at `theta` outside (a vector, radians): what varrho is made of.
+
+    With an `order` H is Chandrasekhar's of that order, in K too.
+    """
+    mu, rho = _refracted(theta, n), single_scattering_albedo
+    return _h(mu, rho, order), 1 - internal_return(mu, rho, n, order)
+
+
+def internal_return(
+    mu_ref: FloatArray, single_scattering_albedo: float, n: float, order: int | None = None
+) -> FloatArray:
     """K of 1998 (8): light that the interface sends back inside and that is scattered again.
 
     K = int_0^{pi/2} F(phi', 1/n) C_rho(cos phi', mu_ref) 2 pi sin(phi') dphi', with (errata)
@@ -137,8 +151,12 @@ def internal_return(mu_ref: FloatArray, single_scattering_albedo: float, n: floa
     the cosine inside, a vector. Below 1, and 0 for n = 1.
     """
     rho = single_scattering_albedo
-    x, weight = _inside(rho, n)
-    return rho / 2 * h_exact(mu_ref, rho) * ((1 / (x + mu_ref[:, np.newaxis])) @ weight)
+    x, weight = _inside(rho, n, order)
+    return rho / 2 * _h(mu_ref, rho, order) * ((1 / (x + mu_ref[:, np.newaxis])) @ weight)
+
+
+def _h(mu: FloatArray, rho: float, order: int | None) -> FloatArray:
+    return h_exact(mu, rho) if order is None else h_order(mu, rho, order)
 
 
 def _internal_return_slope(mu_ref: FloatArray, rho: float, n: float) -> FloatArray:
@@ -150,13 +168,15 @@ def _internal_return_slope(mu_ref: FloatArray, rho: float, n: float) -> FloatArr
     return np.asarray(H / 2 * ((1 + rho * dlog_H) * (inverse @ weight) + by_x))
 
 
-def _h_and_k(mu: FloatArray, rho: float, n: float) -> tuple[FloatArray, FloatArray]:
+def _h_and_k(
+    mu: FloatArray, rho: float, n: float, order: int | None = None
+) -> tuple[FloatArray, FloatArray]:
     """H(mu) and K(mu); those of few cosines, as a scan has, straight, of many by series."""
     few = _few_cosines(mu)
     if few is not None:
         cosines, place = few
-        return h_exact(cosines, rho)[place], internal_return(cosines, rho, n)[place]
-    log_H, K = _evaluate(_h_and_k_series(rho, n), mu, n)
+        return _h(cosines, rho, order)[place], internal_return(cosines, rho, n, order)[place]
+    log_H, K = _evaluate(_h_and_k_series(rho, n, order), mu, n)
     return np.asarray(np.exp(log_H), dtype=np.float64), K
 
 
@@ -195,9 +215,9 @@ def _internal_return_by_n(mu_ref: FloatArray, rho: float, n: float) -> FloatArra
 
 
 @lru_cache(maxsize=64)
-def _h_and_k_series(rho: float, n: float) -> FloatArray:
+def _h_and_k_series(rho: float, n: float, order: int | None = None) -> FloatArray:
     mu, to_series = _chebyshev(n)
-    values = [np.log(h_exact(mu, rho)), internal_return(mu, rho, n)]
+    values = [np.log(_h(mu, rho, order)), internal_return(mu, rho, n, order)]
     return np.asarray(to_series @ np.stack(values, axis=1))
 
 
@@ -267,7 +287,7 @@ def _log_lowest(n: float) -> float:
 
 
 @lru_cache(maxsize=64)
-def _inside(rho: float, n: float) -> tuple[FloatArray, FloatArray]:
+def _inside(rho: float, n: float, order: int | None = None) -> tuple[FloatArray, FloatArray]:
     """Nodes x = cos phi' and weights F x H(x) dx of K's integral.
 
     Below the critical cosine F = 1. Above, by Snell's law, x dx = c dc / n^2 with c the cosine
@@ -280,7 +300,7 @@ def _inside(rho: float, n: float) -> tuple[FloatArray, FloatArray]:
     F_x_dx = np.concatenate(
         [critical * dt * critical * t, (1 - transmittance(outside, n)) * dt * t / (n * n)]
     )
-    return x, F_x_dx * h_exact(x, rho)
+    return x, F_x_dx * _h(x, rho, order)
 
 
 def _refracted(theta: FloatArray, n: float) -> FloatArray:
