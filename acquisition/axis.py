@@ -59,11 +59,19 @@ class Axis:
     def finish_move(self) -> None:
         """Wait for the end of the move and check where the axis stands."""
         reached = self._settings.from_device_deg(self._stage.wait())
+        self._require(reached, self._target_deg, "", "look for what holds the stage, then go on")
+
+    def require_at(self, angle_deg: float) -> None:
+        """Raise `DeviceError` where the axis, once at rest there, no longer stands at an angle."""
+        after = "after the frames were taken, which do not count, "
+        self._require(self.position_deg(), angle_deg, after, "look for what has moved the stage")
+
+    def _require(self, at_deg: float, angle_deg: float, when: str, what_to_do: str) -> None:
         tolerance = self._settings.tolerance_deg
-        if abs(reached - self._target_deg) > tolerance:
+        if abs(at_deg - angle_deg) > tolerance:
             raise DeviceError(
-                f"{self.name}: stands at {reached:g} deg instead of {self._target_deg:g} deg "
-                f"(allowed: {tolerance:g} deg off): look for what holds the stage, then go on"
+                f"{self.name}: {when}stands at {at_deg:g} deg instead of {angle_deg:g} deg "
+                f"(allowed: {tolerance:g} deg off): {what_to_do}"
             )
 
     def settle(self) -> None:

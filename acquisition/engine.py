@@ -15,6 +15,7 @@ from acquisition.exposing import Exposed, Exposer
 from acquisition.going_on import SoFar, describe, where_it_stood
 from acquisition.kept_frames import keep
 from acquisition.motion import NoPathError
+from acquisition.patient_camera import PatientCamera
 from acquisition.plan import Plan, Step
 from acquisition.positioning import Positioner
 from acquisition.preview import preview_of
@@ -63,7 +64,8 @@ class Engine:
         self._pinhole = Pinhole.of(rig)
         self._ended = False
         self._hands = Positioner(rig, devices.axes, devices.lamp, devices.operator, self._answered)
-        self._exposer = Exposer(devices.camera, devices.lamp, devices.clock, protocol, rig, record)
+        camera = PatientCamera(devices.camera)
+        self._exposer = Exposer(camera, devices.lamp, devices.clock, protocol, rig, record)
 
     def run(self, plan: Plan, so_far: SoFar | None = None) -> None:
         """Run all steps, or those that are missing `so_far` of a scan that was stopped.
@@ -140,9 +142,8 @@ class Engine:
         self._devices.begin_step(own.index, first.start_s)
         self._place(own.surface)
         self._hands.go(own.pose)
-        exposed = self._exposer.expose(own, self._window(own))
         reading = replace(
-            self._reduced(exposed),
+            self._reduced(self._exposed(own)),
             step=repeated.index, time_s=so_far.elapsed_s, free_s=so_far.elapsed_s,
         )  # fmt: skip
         check = so_far.check(reading, first)
@@ -169,12 +170,18 @@ class Engine:
             self._hands.set_out(step.pose)
             self._accept(waiting)
             self._hands.arrive()
-            waiting = self._exposer.expose(step, self._window(step))
+            waiting = self._exposed(step)
         self._accept(waiting)
 
     def _place(self, surface: Surface) -> None:
         name = self._protocol.sample.name if surface == "sample" else "the white tile"
         self._hands.place(surface, name)
+
+    def _exposed(self, step: Step) -> Exposed:
+        """The frames of a step, for all of which the axes stood where they were put."""
+        exposed = self._exposer.expose(step, self._window(step))
+        self._hands.require_in_place()
+        return exposed
 
     def _window(self, step: Step) -> Window:
         patch = self._protocol.window

@@ -9,11 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from acquisition.exposure import NEARLY_FULL, longest_below
+from acquisition.patient_camera import PatientCamera
 from acquisition.plan import Step
 from acquisition.radiometry import Dark, bright_level, dark_of
 from acquisition.window import Window
 from instrument.clock import Clock
-from instrument.devices import Camera, Frame, Lamp, Surface
+from instrument.devices import Frame, Lamp, Surface
 from instrument.protocol_config import Protocol
 from instrument.reading import Reading
 from instrument.record import Record
@@ -41,7 +42,7 @@ class Exposed:
 class Exposer:
     """Chooses exposures and keeps the darks; every dark is in the record."""
 
-    camera: Camera
+    camera: PatientCamera
     lamp: Lamp
     clock: Clock
     protocol: Protocol

@@ -14,20 +14,26 @@ from queue import Empty, SimpleQueue
 
 from instrument.record import Record
 
-SPEAKERS = ("drivers", "acquisition")
+SPEAKERS = ("drivers", "acquisition", "sim")
 RETRY, TROUBLE = "retry", "trouble"
 
 
 class Noted(logging.Handler):
-    """Keeps what is logged until `write` puts it into the record: its level says what it is."""
+    """Keeps what is logged until `write` puts it into the record: its level says what it is.
+
+    `troubles`: what a person has to be told as well.
+    """
 
     def __init__(self, record: Record) -> None:
         super().__init__(logging.WARNING)
         self._record = record
+        self.troubles: list[str] = []
         self._waiting: SimpleQueue[logging.LogRecord] = SimpleQueue()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Take a message from any thread."""
+        if record.levelno >= logging.ERROR:
+            self.troubles.append(record.getMessage())
         self._waiting.put(record)
 
     def write(self) -> None:

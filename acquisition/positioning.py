@@ -85,6 +85,15 @@ class Positioner:
             self._axes[name].settle()
         self.pose, self._moves = self._target, ()
 
+    def require_in_place(self) -> None:
+        """Raise `DeviceError` where a motor no longer stands where it was put.
+
+        Whatever was seen meanwhile belongs to no angle.
+        """
+        for name, axis in self._axes.items():
+            if not axis.by_hand:
+                axis.require_at(getattr(self.pose, name))
+
     def place(self, surface: Surface, name: str) -> None:
         """Have the operator put sample or white tile on the table, unless it is there."""
         if surface == self.surface:

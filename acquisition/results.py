@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +20,7 @@ from analysis.fit_json import nothing, to_json
 from analysis.report import write_report
 from analysis.report_data import Parameter
 from instrument.config import Loaded
-from instrument.errors import NotDetermined
+from instrument.errors import NotDetermined, StorageError
 from instrument.files import write_whole
 from instrument.geometry import FloatArray
 from instrument.record import Record
@@ -41,7 +43,10 @@ class Outcome:
 
 
 def finish(record: Record, loaded: Loaded) -> Outcome:
-    """Reduce, fit and report; each file in the run's folder is written whole or not at all."""
+    """Reduce, fit and report; each file in the run's folder is written whole or not at all.
+
+    Raises `NotDetermined` where nothing was measured, `StorageError` where the disk fails.
+    """
     reduced = reduce(record.readings(), loaded.protocol, record.checks())
     if not reduced.points:
         raise NotDetermined(
@@ -56,12 +61,24 @@ def finish(record: Record, loaded: Loaded) -> Outcome:
         nothing(fitted.reason) if fitted.choice is None else to_json(fitted.choice),
         record.folder / "report.html",
     )
-    write_whole(record.folder / "measurements.csv", table(reduced, u_brdf))
-    write_whole(record.folder / "fit.json", json.dumps(outcome.fit, indent=2, allow_nan=False))
+    with _kept(record.folder):
+        write_whole(record.folder / "measurements.csv", table(reduced, u_brdf))
+        write_whole(record.folder / "fit.json", json.dumps(outcome.fit, indent=2, allow_nan=False))
     words = (outcome.headline, outcome.notes)
     shown = report_data(reduced, fitted, budget(reduced, u_brdf), words, record, loaded)
-    write_report(outcome.report, shown)
+    with _kept(record.folder):
+        write_report(outcome.report, shown)
     return outcome
+
+
+@contextmanager
+def _kept(run: Path) -> Iterator[None]:
+    """Say how to go on where the disk does not take a result (`StorageError`)."""
+    try:
+        yield
+    except StorageError as error:
+        text = f"{error}. Nothing measured is lost; then: gonio report {run}"
+        raise StorageError(text) from error
 
 
 def table(reduced: Reduced, u_brdf: FloatArray) -> str:

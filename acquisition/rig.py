@@ -18,6 +18,7 @@ from instrument.devices import Camera, Lamp, Operator, Stage
 from instrument.errors import InputError
 from instrument.rig_config import Rig
 from sim.clock import SimulatedClock
+from sim.faults import Faults
 from sim.operator import SimulatedOperator, SimulatedShutter
 from sim.scene import Scene
 
@@ -51,13 +52,14 @@ def see_emulated_camera(rig: Rig) -> None:
         restart_with_camera()
 
 
-def open_devices(loaded: Loaded) -> Devices:
+def open_devices(loaded: Loaded, faults: Faults | None = None) -> Devices:
     """Open every device of the rig file, and close them all again if one cannot be opened.
 
-    A scene that is simulated answers the operator's prompts.
+    A scene that is simulated answers the operator's prompts; its devices have the `faults`, or
+    those of the environment: see `sim.faults`.
     """
     with ExitStack() as opening:
-        bench = opening.enter_context(Bench(loaded))
+        bench = opening.enter_context(Bench(loaded, faults))
         axes = {name: bench.axis(name) for name in AXES}
         camera, step = bench.camera(), bench.begin_step
         devices = Devices(axes, camera, bench.lamp, bench.operator, bench.clock, step)
@@ -67,9 +69,10 @@ def open_devices(loaded: Loaded) -> Devices:
 class Bench(Closing):
     """What a rig file describes; each device is opened when it is asked for. Use it with `with`."""
 
-    def __init__(self, loaded: Loaded) -> None:
+    def __init__(self, loaded: Loaded, faults: Faults | None = None) -> None:
         from drivers.opening import Lines
 
+        self._faults = (faults or Faults.asked_for()) if loaded.rig.simulated else None
         self._rig, self._closing = loaded.rig, ExitStack()
         self._scene = None if self._rig.real else _scene(loaded)
         self.clock: Clock = SimulatedClock() if self._rig.simulated else SystemClock()
@@ -100,6 +103,7 @@ class Bench(Closing):
             from sim.camera import SimulatedCamera
 
             camera = SimulatedCamera(self._simulated(), self.clock)
+            camera = self._faults.camera(camera) if self._faults else camera
         self._closing.callback(camera.close)
         return camera
 
@@ -121,7 +125,9 @@ class Bench(Closing):
         if isinstance(settings, SimulatedAxis):
             from sim.stage import SimulatedStage
 
-            return SimulatedStage(name, settings, self._simulated(), self.clock)
+            scene = self._simulated()
+            stage = SimulatedStage(name, settings, scene, self.clock)
+            return self._faults.stage(name, stage, settings, scene) if self._faults else stage
         return self._driven(name, settings)
 
     def _driven(self, name: str, settings: Wired) -> Stage:
@@ -137,12 +143,14 @@ class Bench(Closing):
             return TerminalOperator()
         # In real time too nobody waits for an operator who is simulated.
         clock = self.clock if self._rig.simulated else SimulatedClock()
-        return SimulatedOperator(self._scene, clock)
+        operator = SimulatedOperator(self._scene, clock)
+        return self._faults.operator(operator) if self._faults else operator
 
     def _lamp(self) -> Lamp:
         if self._scene is None or self._rig.lamp.darkened_by == "hand":
             return HandCoveredLamp(self.operator)
-        return SimulatedShutter(self._scene, self.clock)
+        shutter = SimulatedShutter(self._scene, self.clock)
+        return self._faults.lamp(shutter) if self._faults else shutter
 
     def _emulate(self) -> EmulatedBench:
         from sim.emulated import EmulatedBench

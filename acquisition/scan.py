@@ -23,20 +23,22 @@ def scan(loaded: Loaded, plan: Plan, record: Record, so_far: SoFar | None = None
     Raises `OperatorStop`, `DeviceError` or `StorageError` with the command that goes on.
     """
     clock: Clock = SystemClock()
-    try:
-        with noted(record) as notes, closing(open_devices(loaded)) as devices:
-            clock = devices.clock
-            try:
+    with noted(record) as notes:
+        try:
+            with closing(open_devices(loaded)) as devices:
+                clock = devices.clock
                 _drive(loaded, plan, record, so_far, devices, notes)
-            finally:
-                notes.write()
-    except (KeyboardInterrupt, OperatorStop) as stop:
-        why = str(stop) or "stopped by the operator"
-        _write_down(record, clock, "stopped", why)
-        raise OperatorStop(f"{why}: all motion has ended. {_go_on(record)}") from None
-    except (DeviceError, StorageError) as error:
-        _write_down(record, clock, "fault", str(error))
-        raise type(error)(f"{error}\n{_go_on(record)}") from error
+        except (KeyboardInterrupt, OperatorStop) as stop:
+            why = str(stop) or "stopped by the operator"
+            _write_down(record, notes, clock, "stopped", why)
+            ended = "" if notes.troubles else ": all motion has ended."
+            raise OperatorStop(f"{why}{ended} {_go_on(record, notes)}") from None
+        except (DeviceError, StorageError) as error:
+            _write_down(record, notes, clock, "fault", str(error))
+            raise type(error)(f"{error}\n{_go_on(record, notes)}") from error
+        except Exception as error:
+            _write_down(record, notes, clock, "fault", f"the program failed: {error!r}")
+            raise
 
 
 def _drive(
@@ -58,9 +60,11 @@ def _drive(
     with progress(plan, before.done) as show:
         told = _both(show, notes)
         Engine(loaded.protocol, loaded.rig, devices, record, told).run(plan, so_far)
+    notes.write()
     record.add_event(clock.utc().isoformat(), "finished", f"{len(plan.steps)} steps")
     record.set_meta("scan_s", f"{clock.now_s() - begun_s:.1f}")
     record.set_meta("finished_utc", clock.utc().isoformat(timespec="seconds"))
+    console.print(_unsafe(notes), end="", highlight=False, soft_wrap=True)
 
 
 def _both(show: Callable[[Step], None], notes: Noted) -> Callable[[Step], None]:
@@ -71,17 +75,24 @@ def _both(show: Callable[[Step], None], notes: Noted) -> Callable[[Step], None]:
     return on_step
 
 
-def _write_down(record: Record, clock: Clock, kind: str, why: str) -> None:
+def _write_down(record: Record, notes: Noted, clock: Clock, kind: str, why: str) -> None:
     """Note why a scan ended; where the disk takes nothing more, the message alone has to tell."""
     try:
+        notes.write()
         record.add_event(clock.utc().isoformat(), kind, why)
     except StorageError:
         return
 
 
-def _go_on(record: Record) -> str:
+def _go_on(record: Record, notes: Noted) -> str:
+    """What is not safe, what is, and the command that goes on."""
     where = record.where()
     if where is None:
-        return "Nothing is left to go on from"
+        return f"{_unsafe(notes)}Nothing is left to go on from"
     safe = f"{len(record.readings())} readings are safe in {where}"
-    return f"{safe}. Go on with: gonio resume {where}"
+    return f"{_unsafe(notes)}{safe}. Go on with: gonio resume {where}"
+
+
+def _unsafe(notes: Noted) -> str:
+    """What a person has to see to, a line each; nothing where all is well."""
+    return "".join(f"LOOK AT THE RIG FIRST: {text}\n" for text in notes.troubles)

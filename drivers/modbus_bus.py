@@ -42,6 +42,10 @@ _DIALOUT = (
 )
 
 log = logging.getLogger(__name__)
+_GATEWAY = (
+    "look at the gateway's power and its network cable, at its address in the rig file, and at who "
+    "else is connected to it"
+)
 _READ, _WRITE_ONE, _WRITE = 3, 6, 16
 _GATEWAY_SILENT = 0x0B
 _MEANINGS = {
@@ -82,7 +86,8 @@ class ModbusBus(Closing):
         try:
             self._client.connect()
         except (OSError, ValueError, termios.error) as error:
-            raise PortGone(f"{who}: cannot open {self.port}: {error}: {_DIALOUT}") from error
+            look = _GATEWAY if self._tcp else _DIALOUT
+            raise PortGone(f"{who}: cannot open {self.port}: {error}: {look}") from error
 
     def quiet_yet(self, who: str) -> bool:
         """Listen a moment; whether nothing has come for as long as an answer may take."""

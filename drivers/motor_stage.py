@@ -148,8 +148,12 @@ class MotorStage(ABC):
         return max(low, self._limits.min_deg), min(high, self._limits.max_deg)
 
     def position_deg(self) -> float:
-        """Where the stage is. Before homing nobody knows, whatever the controller counts."""
+        """Where the stage is. Before homing nobody knows, whatever the controller counts.
+
+        Nor while its controller has a fault: a motor that was let go may stand anywhere.
+        """
         now = self.status()
+        self._refuse_fault(now)
         if not now.homed and not now.moving:
             raise DeviceError(
                 f"{self.name}: not homed, so its position is not known: home it first"
@@ -228,6 +232,7 @@ class MotorStage(ABC):
     def _watch_move(self, target_deg: float) -> float:
         watch = _Watch(self._limits, self._from_deg, target_deg, self._started_s)
         while not watch.ended(now := self._looked()):
+            self._refuse_lost(now)
             time_s = self._clock.now_s()
             if watch.not_begun(time_s):
                 log.warning("%s: stands still: told again to go to %g deg", self.name, target_deg)
@@ -280,6 +285,7 @@ class MotorStage(ABC):
             log.error("%s: %s; the stop failed too: %s", self.name, _UNHEARD, error)
 
     def _arrived(self, now: Status) -> float:
+        self._refuse_lost(now)
         target, self._target_deg = self._target_deg, None
         if target is not None and abs(now.position_deg - target) > self._limits.tolerance_deg:
             raise DeviceError(
@@ -294,6 +300,15 @@ class MotorStage(ABC):
         if self._stopped:
             self._send_stop()
             raise Stopped(f"{self.name}: stopped as it was about to move")
+
+    def _refuse_lost(self, now: Status) -> None:
+        """A controller that was without power counts from nowhere."""
+        if not now.homed and not now.moving:
+            self._target_deg = None
+            raise DeviceError(
+                f"{self.name}: has lost its reference on the way: look at its controller's supply, "
+                "then home it"
+            )
 
     def _refuse_fault(self, now: Status) -> None:
         if now.fault:

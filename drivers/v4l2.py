@@ -14,14 +14,14 @@ from typing import TypeVar
 
 from drivers import v4l2_ioctl as v4l2
 from drivers.v4l2_capture import Traits
-from drivers.v4l2_opening import CABLE, CameraLost, lost
+from drivers.v4l2_opening import CABLE, lost
 from drivers.v4l2_reader import Hung, Life, Reader
 from drivers.v4l2_session import EXTRA_FRAMES, Session
 from drivers.v4l2_settings import PixelFormat, V4l2Settings
 from instrument.clock import Clock
 from instrument.closing import Closing
 from instrument.devices import Frame
-from instrument.errors import DeviceError
+from instrument.errors import CameraLost, DeviceError
 
 log = logging.getLogger(__name__)
 

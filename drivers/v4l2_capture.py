@@ -19,7 +19,6 @@ from drivers import v4l2_ioctl as v4l2
 from drivers.v4l2_controls import EXPOSURE, GAIN, Controls
 from drivers.v4l2_opening import (
     CABLE,
-    CameraLost,
     buffer_count,
     lost,
     open_control,
@@ -29,7 +28,7 @@ from drivers.v4l2_reader import Life
 from drivers.v4l2_settings import STEPS_PER_S, V4l2Settings
 from instrument.clock import Clock
 from instrument.devices import Image
-from instrument.errors import DeviceError
+from instrument.errors import CameraLost, DeviceError
 
 PATIENCE_S = 1.0  # beyond the exposure and a period; a silent camera is named after that
 _STARTING_S = 2.0  # what a camera may take to its first frame
@@ -151,7 +150,7 @@ class Capture:
             self.check_presence()  # it is there: one failed request heals by itself
             self._clock.sleep(_RETRY_S)
         self.check_presence()
-        raise DeviceError(
+        raise CameraLost(
             f"{self._who}: no frame for {patience_s:.1f} s at an exposure of {self._exposure_s:g} "
             f"s: the stream stands still; {CABLE}; the next try opens the camera anew"
         )

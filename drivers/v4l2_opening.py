@@ -12,17 +12,13 @@ from typing import TYPE_CHECKING
 
 from drivers import v4l2_ioctl as v4l2
 from drivers.v4l2_settings import V4l2Settings
-from instrument.errors import DeviceError
+from instrument.errors import CameraLost, DeviceError
 
 if TYPE_CHECKING:
     from cv2 import VideoCapture
 
 CABLE = "look at the USB cable, at the camera and at the computer, and at the hub between"
 _LEAST_BUFFERS = 2
-
-
-class CameraLost(DeviceError):
-    """The camera does not answer; it may come back."""
 
 
 def lost(who: str, error: OSError) -> CameraLost:

@@ -31,6 +31,10 @@ class DeviceError(GonioError):
     exit_code = 3
 
 
+class CameraLost(DeviceError):
+    """The camera is away or gives no frames; its next call looks for it and opens it anew."""
+
+
 class StorageError(GonioError):
     """The disk does not take what has to be kept: the message says which file and why."""
 

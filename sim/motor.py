@@ -93,7 +93,21 @@ class Motor:
     def hold(self) -> None:
         """Something holds the axis: it gets no further, and its controller does not notice."""
         with self._lock:
-            self._held_deg = self.position_deg
+            at_deg = self.position_deg
+            if not self.moving:  # what has ended is no move that is held
+                self._from_deg, self._move = at_deg, self._over(0.0)
+            self._held_deg = at_deg
+
+    def push(self, by_deg: float) -> None:
+        """Something turns the axis away from where it stands; its encoder tells."""
+        with self._lock:
+            self._from_deg += by_deg
+
+    def lose_power(self) -> None:
+        """Its controller starts anew: it stands, and has no reference."""
+        with self._lock:
+            self.stop()
+            self.referenced = False
 
     def fail(self, alarm: str) -> None:
         """The controller finds something wrong, named in its own code, and stops."""

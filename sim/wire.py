@@ -62,6 +62,11 @@ class _Wire(Closing):
         with self._lock:
             self._faults.extend(faults)
 
+    def heal(self) -> None:
+        """Spoil nothing any more."""
+        with self._lock:
+            self._faults.clear()
+
     @property
     def pending(self) -> int:
         """Faults that have not happened yet."""

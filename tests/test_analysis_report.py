@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import re
 import struct
 import zlib
@@ -16,6 +17,7 @@ import pytest
 from analysis.report import report_html, write_report
 from analysis.report_data import Candidate, Parameter, ReportData, sweeps_of
 from analysis.report_style import format_value
+from instrument.errors import StorageError
 from instrument.geometry import FloatArray
 from instrument.reading import Preview
 
@@ -211,10 +213,10 @@ class TestFile:
         path.write_text("old")
 
         def full(self: Path, _: Path) -> None:
-            raise OSError("no space left on device")
+            raise OSError(errno.ENOSPC, "no space left on device")
 
         monkeypatch.setattr(Path, "replace", full)
-        with pytest.raises(OSError, match="no space"):
+        with pytest.raises(StorageError, match=r"report\.html: the disk is full"):
             write_report(path, without_tile())
         assert path.read_text() == "old"
         assert list(tmp_path.iterdir()) == [path]

@@ -126,7 +126,8 @@ PROTOCOL_MISTAKES = {
         "point: 4",
         "point: 4\ncolour: red",
         "10:1: colour: unknown key; allowed: name, description, rig, sample, sweeps, window,"
-        " frames_per_point, dark_frames, exposure_target, references, fit, simulated_sample",
+        " frames_per_point, dark_frames, exposure_target, keep_frames, references, fit,"
+        " simulated_sample",
     ),
     "misspelt key that is required": (
         "u_reflectance: 0.005",

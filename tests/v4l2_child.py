@@ -5,10 +5,12 @@ Requests are (name, arguments); each public method of `Child` is one. The answer
 
 from __future__ import annotations
 
+import logging
 import sys
 import threading
 import time
 from datetime import UTC, datetime
+from logging.handlers import MemoryHandler
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -38,6 +40,8 @@ class MonotonicClock:
 class Child:
     def __init__(self) -> None:
         self.camera: V4l2Camera | None = None
+        self.logged = MemoryHandler(10_000)
+        logging.getLogger("drivers").addHandler(self.logged)
 
     def open(self, settings: V4l2Settings) -> str:
         self.close()
@@ -54,6 +58,12 @@ class Child:
         assert self.camera is not None
         with patch("drivers.v4l2_gate.Gate.admits", return_value=True):
             return self.camera.grab(count)
+
+    def said(self) -> list[str]:
+        """What the driver has logged since this was last asked."""
+        texts = [record.getMessage() for record in self.logged.buffer]
+        self.logged.buffer.clear()
+        return texts
 
     def close(self) -> None:
         camera, self.camera = self.camera, None
