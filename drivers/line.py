@@ -19,6 +19,7 @@ from instrument.errors import DeviceError
 
 REPLY_S = 0.15  # controllers answer within 10 to 50 ms; a stop waits no longer than this, and an
 # answer that was lost is had again before the status of a moving stage is too old
+WRITE_S = 0.5  # pyserial counts the time that a busy computer takes it off the processor, too
 MOST_BYTES = 1024  # of a line: what is longer is noise
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
@@ -64,7 +65,7 @@ class Line(Closing):
         self._buffer = bytearray()
         try:
             self._serial = serial.serial_for_url(
-                port, baudrate=baudrate, timeout=reply_s, write_timeout=reply_s,
+                port, baudrate=baudrate, timeout=reply_s, write_timeout=WRITE_S,
                 xonxoff=xonxoff, exclusive=True,
             )  # fmt: skip
         except (OSError, ValueError, termios.error) as error:

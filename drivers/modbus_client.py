@@ -18,7 +18,7 @@ import serial
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException
 
-from drivers.line import REPLY_S
+from drivers.line import REPLY_S, WRITE_S
 from instrument.errors import InputError
 
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # errors are raised, not printed
@@ -77,7 +77,7 @@ class SerialClient(_Prompt, ModbusSerialClient):
             how = self.comm_params
             self.socket = serial.serial_for_url(
                 how.host, baudrate=how.baudrate, parity=how.parity, timeout=0,
-                write_timeout=how.timeout_connect, exclusive=True,
+                write_timeout=WRITE_S, exclusive=True,
             )  # fmt: skip
         return True
 

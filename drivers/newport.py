@@ -138,6 +138,7 @@ class NewportStage(MotorStage):
 
     def close(self) -> None:
         """Let go of the line."""
+        self._watchdog.end()
         self._port.line.close()
 
     def _number(self, letters: str) -> Callable[[str], float]:

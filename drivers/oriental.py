@@ -118,6 +118,7 @@ class OrientalStage(MotorStage):
 
     def close(self) -> None:
         """Let go of the line; safe twice."""
+        self._watchdog.end()
         if self._owns_bus:
             self._bus.close()
 

@@ -112,6 +112,7 @@ class ZaberStage(MotorStage):
 
     def close(self) -> None:
         """Let go of the line."""
+        self._watchdog.end()
         self._port.line.close()
 
     def _angle(self, setting: str) -> float:
