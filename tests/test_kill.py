@@ -34,11 +34,11 @@ def nothing_lost(outcome: dict[str, int]) -> bool:
 
 @pytest.mark.slow
 def test_killed_at_any_moment_nothing_is_lost_twice_or_different(
-    tmp_path: Path, slow: bool, record_property: Callable[[str, object], None]
+    tmp_path: Path, slow: bool, record_testsuite_property: Callable[[str, object], None]
 ) -> None:
     kills = 1000 if slow else 25
     outcome = json.loads(child([tmp_path, kills, 2026], {}, 3600))
-    record_property("kills at random moments", outcome)
+    record_testsuite_property("kills at random moments", outcome)
     assert outcome["kills"] >= kills
     assert outcome["accepted_before"] > kills  # they were well under way
     assert outcome["killed_twice"] > 0
@@ -50,12 +50,12 @@ def test_killed_before_each_thing_that_it_writes_nothing_is_lost_twice_or_differ
     recorder: dict[str, str],
     tmp_path: Path,
     slow: bool,
-    record_property: Callable[[str, object], None],
+    record_testsuite_property: Callable[[str, object], None],
 ) -> None:
     """Every write, fsync, new name and removal of a scan: the journal's boundaries among them."""
     stride = 1 if slow else 23
     environment = recorder | {"GONIO_RECORD_ROOT": str(tmp_path)}
     outcome = json.loads(child([tmp_path, "entries", stride], environment, 3600))
-    record_property("kills before each entry", outcome)
+    record_testsuite_property("kills before each entry", outcome)
     assert outcome["kills"] > 200 / stride
     assert nothing_lost(outcome), outcome

@@ -60,7 +60,7 @@ def look(run: Path, accepted: set[int], whole: dict[int, Reading]) -> None:
 
 @pytest.mark.slow
 def test_after_a_power_cut_at_any_moment_all_that_was_accepted_is_there(
-    log: Path, tmp_path: Path, slow: bool, record_property: Callable[[str, object], None]
+    log: Path, tmp_path: Path, slow: bool, record_testsuite_property: Callable[[str, object], None]
 ) -> None:
     root, draws = str(log.parent / "disk"), 4 if slow else 1
     with Record.open(Path(root) / "deep" / "run") as record:
@@ -75,7 +75,7 @@ def test_after_a_power_cut_at_any_moment_all_that_was_accepted_is_there(
             shutil.rmtree(left)
             looked += 1
     assert disk.accepted == set(whole)
-    record_property("power cuts", looked)
+    record_testsuite_property("power cuts", looked)
 
 
 def test_the_replay_itself_keeps_what_was_synced_and_drops_what_was_not(tmp_path: Path) -> None:

@@ -26,6 +26,8 @@ def test_the_commands_run_in_their_order(tmp_path: Path) -> None:
     gonio = [line.split()[1:] for line in commands if line.startswith("gonio ")]
     assert len(gonio) >= 4
     for arguments in gonio:
+        if arguments[0] == "bench":  # takes minutes: what it does is in `test_bench`
+            arguments = ["bench", "--help"]  # noqa: PLW2901 - the same command, shown
         done = gonio_here(*arguments, cwd=tmp_path)
         assert done.returncode == 0, (arguments, done.stderr)
 
