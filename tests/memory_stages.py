@@ -10,11 +10,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any
 from unittest.mock import patch
 
 from benches import LIMITS, MECHANICS, STEPS_PER_DEG
 from conftest import CONFIGS
+from memory_wire import Unwatched
 
 from drivers.line import Line
 from drivers.newport import NewportStage
@@ -31,8 +32,6 @@ from sim.scene import Scene
 from sim.stage import SimulatedStage
 from sim.wire import Controller
 from sim.zaber_controller import MICROSTEPS_PER_DEG, ZaberController
-
-T = TypeVar("T")
 
 
 @dataclass
@@ -108,24 +107,6 @@ def _words(*values: int) -> bytes:
     return b"".join((value & 0xFFFF).to_bytes(2, "big") for value in values)
 
 
-class _NobodyWatches:
-    """The watchdog's calls, without its thread."""
-
-    fired = False
-
-    def __init__(self, *_: object) -> None:
-        pass
-
-    def begin(self) -> None:
-        pass
-
-    def end(self) -> None:
-        pass
-
-    def hear(self, ask: Callable[[], T]) -> T:
-        return ask()
-
-
 @contextmanager
 def newport() -> Iterator[Plant]:
     """An SMC100: limits of its own on one side, keeps its reference."""
@@ -180,7 +161,7 @@ def _demo() -> Loaded:
 def _patched() -> Iterator[tuple[SimulatedClock, Motor]]:
     clock = SimulatedClock()
     with ExitStack() as stack:
-        stack.enter_context(patch("drivers.motor_stage.Watchdog", _NobodyWatches))
+        stack.enter_context(patch("drivers.motor_stage.Watchdog", Unwatched))
         yield clock, Motor(MECHANICS, clock)
 
 

@@ -146,7 +146,7 @@ class MemoryBench:
         self.port.spoil = spoiled
 
 
-class _Unwatched(Watchdog):
+class Unwatched(Watchdog):
     """The watchdog lives in real time, of which nothing goes by here."""
 
     def begin(self) -> None:
@@ -162,7 +162,7 @@ def bench(kind: str, patch: pytest.MonkeyPatch) -> MemoryBench:
     port = MemoryPort(answering, clock)
     for module in ("line", "modbus_bus", "modbus_client", "oriental"):
         patch.setattr(f"drivers.{module}.time", clock)
-    patch.setattr("drivers.motor_stage.Watchdog", _Unwatched)
+    patch.setattr("drivers.motor_stage.Watchdog", Unwatched)
     # Each question that is asked again is logged; what a test runner keeps of that is no leak.
     patch.setattr(logging.Logger, "warning", lambda *_: None)
     patch.setattr("serial.serial_for_url", lambda *_, **__: port)

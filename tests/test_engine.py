@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import CONFIGS, changed
+from small_scan import small_scan
 
 from acquisition.axis import Axis
 from acquisition.engine import Devices, Engine
@@ -19,24 +20,13 @@ from acquisition.rig import open_devices
 from instrument.config import Loaded, load_protocol
 from instrument.devices import Frame, Request
 from instrument.errors import DeviceError, OperatorStop
-from instrument.protocol_config import DriftCheck, References, WhiteTile
 from instrument.record import FILE_NAME, Record
 
 
 @pytest.fixture(scope="module")
 def small() -> Loaded:
-    """Two incidences, five view angles, all references."""
-    demo = load_protocol(CONFIGS / "protocols" / "demo.yaml")
-    sweep = {
-        "theta_i_deg": [30.0, 60.0],
-        "dphi_deg": [0.0],
-        "theta_r_deg": [-70.0, -35.0, 0.0, 35.0, 70.0],
-    }
-    references = References(
-        white_tile=WhiteTile(reflectance=0.99, u_reflectance=0.005, theta_r_deg=10.0, frames=4),
-        drift_check=DriftCheck(theta_r_deg=10.0, every_points=4),
-    )
-    return changed(demo, sweeps=[sweep], references=references)
+    """Two incidences, five view angles, all references; all pixels."""
+    return small_scan(shrink=1)
 
 
 @pytest.fixture
