@@ -206,9 +206,7 @@ class TestFile:
         assert path.read_text(encoding="utf-8").endswith("</html>\n")
         assert list(tmp_path.iterdir()) == [path]
 
-    def test_old_one_survives_a_failure(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_old_one_survives(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         path = tmp_path / "report.html"
         path.write_text("old")
 
