@@ -84,6 +84,20 @@ def test_cut_after_any_step_the_rest_is_the_same_to_the_last_digit(
             assert not any(check.jumped for check in record.checks())
 
 
+@pytest.mark.parametrize("upto", [0, 4, 8, 13])
+def test_where_a_person_sets_the_lamp_the_result_is_the_same_too(upto: int, tmp_path: Path) -> None:
+    """Its darks come first, and again at a resume: the scan's times are others, no value is."""
+    loaded = small_scan("paper_1995")
+    brdf = []
+    for name, ends in (("whole", (None,)), ("cut", (upto, None))):
+        with Record.create(tmp_path / name, {}) as record:
+            for end in ends:
+                scan(loaded, record, end)
+            found = reduce(record.readings(), loaded.protocol, record.checks())
+            brdf.append(found.brdf.tolist())
+    assert brdf[0] == brdf[1]
+
+
 def test_cut_again_and_again_the_rest_is_the_same(
     small: Loaded, whole: list[Reading], tmp_path: Path
 ) -> None:
