@@ -240,6 +240,7 @@ class MotorStage(ABC):
                 self._stop_if_stopped()
             wrong = watch.wrong(now, time_s)
             if wrong:
+                self._target_deg = None
                 self.stop()
                 raise DeviceError(f"{self.name}: {wrong}")
             self._clock.sleep(POLL_S)

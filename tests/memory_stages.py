@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 from unittest.mock import patch
@@ -131,10 +131,11 @@ def zaber() -> Iterator[Plant]:
 
 @contextmanager
 def oriental() -> Iterator[Plant]:
-    """An AZ drive: the rig file's limits alone."""
+    """An AZ drive: its own limits cannot be asked for, so the rig file's must be as narrow."""
     with _patched() as (clock, motor):
         drive = OrientalController(motor, steps_per_deg=STEPS_PER_DEG, now_s=clock.now_s)
-        settings = OrientalSettings("memory", STEPS_PER_DEG, LIMITS)
+        limits = replace(LIMITS, max_deg=MECHANICS.max_deg)
+        settings = OrientalSettings("memory", STEPS_PER_DEG, limits)
         with patch("drivers.oriental.ModbusUnit", lambda *_: _MemoryUnit(drive)):
             stage = OrientalStage("theta_r", settings, clock, bus=_no_bus())
         yield _plant(stage, clock, motor, lambda: drive.triggers, "30")
