@@ -46,7 +46,7 @@ def test_ggx_by_vectors(
     lamp, camera = vectors(*map(math.radians, (theta_i, theta_r, dphi)))
     half = (lamp + camera) / np.linalg.norm(lamp + camera)
 
-    def Lambda(v: FloatArray) -> float:  # noqa: N802 -- the source's symbol
+    def Lambda(v: FloatArray) -> float:  # noqa: N802 - the source's symbol
         tan2 = (1 - v[2] ** 2) / v[2] ** 2
         return float((math.sqrt(1 + alpha**2 * tan2) - 1) / 2)
 
@@ -141,7 +141,7 @@ def printed_eon(i: float, r: float, dphi: float, rho: float, rough: float) -> fl
     s_over_t = s / max(mu_i, mu_o) if s > 0 else s
     A = 1 / (1 + (1 / 2 - 2 / (3 * math.pi)) * rough)
 
-    def E(mu: float) -> float:  # noqa: N802 -- the source's symbol
+    def E(mu: float) -> float:  # noqa: N802 - the source's symbol
         S = math.sqrt(1 - mu * mu)
         G = S * (math.acos(mu) - S * mu) + 2 / 3 * (S / mu * (1 - S**3) - S)
         return A + rough * A / math.pi * G

@@ -83,8 +83,7 @@ def _problem(name: str) -> str:
     """What keeps an installed program from giving a right answer; empty where nothing does."""
     try:
         found, right = _PROBES[name]()
-    # Whatever a foreign program dies of, the bench goes on, and the page says so.
-    except Exception as error:  # noqa: BLE001
+    except Exception as error:  # noqa: BLE001 - whatever it dies of, the page says so
         return f"{type(error).__name__}: {error}"
     return "" if abs(found - right) < 1e-3 else f"{found:g} in place of {right:g}"
 
