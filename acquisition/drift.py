@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.measurements import IntArray
 from instrument.geometry import FloatArray
 from instrument.reading import Check, Reading
-
-IntArray = NDArray[np.int64]
 
 LEAST_SIGNAL_U = 10.0  # a check with less signal than this many u follows noise and not the lamp
 JUMP_U, LEAST_JUMP = 4.0, 0.003  # a lamp has jumped when it is off by more than both of these

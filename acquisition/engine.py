@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, replace
 
 from acquisition.axis import Axis
 from acquisition.exposing import Exposed, Exposer
-from acquisition.going_on import SoFar, describe, where_it_stood
+from acquisition.going_on import SoFar, describe
 from acquisition.kept_frames import keep
 from acquisition.motion import NoPathError
 from acquisition.patient_camera import PatientCamera
@@ -122,7 +122,7 @@ class Engine:
         self._exposer.know(so_far.readings)
         self._exposer.take_darks(plan.darks_first_s)
         self._check_drift(plan, so_far, first)
-        stood = where_it_stood(so_far.readings, first, plan)
+        stood = so_far.where_it_stood(plan, first)
         if stood is not None:
             self._return_to(stood, first.surface)
         self._exposer.start(so_far.elapsed_s)

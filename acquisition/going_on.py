@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from acquisition.drift import JUMP_U, LEAST_JUMP, Drift, usable
@@ -38,6 +37,12 @@ class SoFar:
         made = [r for r in self.readings if r.kind == "drift" and r.block == block and usable(r)]
         return plan.steps[made[-1].step] if made else None
 
+    def where_it_stood(self, plan: Plan, first: Step) -> Step | None:
+        """The last accepted step, where what comes next belongs to the same setting by hand."""
+        if not self.readings or self.readings[-1].block != first.block:
+            return None
+        return plan.steps[self.readings[-1].step]
+
     def check(self, repeated: Reading, before: Step) -> Check:
         """What the drift reference, measured again, says of the lamp."""
         drift = Drift.of(self.readings, before.block, self.checks)
@@ -60,10 +65,3 @@ def describe(check: Check) -> str:
     if not usable(check.reading):
         return f"{text}: not usable ({check.reading.flags or 'too little signal'})"
     return f"{text}: as before"
-
-
-def where_it_stood(so_far: Sequence[Reading], first: Step, plan: Plan) -> Step | None:
-    """The last accepted step, where what comes next belongs to the same setting by hand."""
-    if not so_far or so_far[-1].block != first.block:
-        return None
-    return plan.steps[so_far[-1].step]

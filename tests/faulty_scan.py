@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from unittest.mock import patch
 
-from test_going_on import undated
+from small_scan import undated
 
 from acquisition import scan as scanning
 from acquisition.engine import Devices

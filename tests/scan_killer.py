@@ -18,11 +18,11 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from conftest import changed
-from small_scan import small_scan
+from small_scan import small_scan, undated
 
 from acquisition.engine import Engine
 from acquisition.going_on import SoFar
@@ -31,7 +31,6 @@ from acquisition.reduction import reduce
 from acquisition.rig import open_devices
 from instrument.config import Loaded
 from instrument.errors import InputError
-from instrument.reading import Reading
 from instrument.record import Record
 
 
@@ -74,10 +73,6 @@ def opened(folder: Path) -> Record:
                 raise
         shutil.rmtree(folder)
     return Record.create(folder, {})
-
-
-def undated(readings: list[Reading]) -> list[Reading]:
-    return [replace(r, time_utc="", free_s=0.0) for r in readings]
 
 
 class Killer:

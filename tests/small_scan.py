@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from conftest import CONFIGS, changed
 
 from instrument.config import Loaded, load_protocol
 from instrument.protocol_config import DriftCheck, References, WhiteTile
+from instrument.reading import Reading
 
 SHRINK = 5
 
@@ -33,3 +36,8 @@ def small_scan(rig: str = "bench_12bit", shrink: int = SHRINK) -> Loaded:
         }
     )
     return changed(demo, rig={"camera": small}, sweeps=[sweep], references=references)
+
+
+def undated(readings: list[Reading]) -> list[Reading]:
+    """All but the date and a sum of times that is rounded otherwise; `time_s` stays."""
+    return [replace(r, time_utc="", free_s=0.0) for r in readings]

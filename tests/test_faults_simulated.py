@@ -14,8 +14,7 @@ from pathlib import Path
 import faulty_scan
 import pytest
 from faulty_scan import Ended, Moment, require_named
-from small_scan import small_scan
-from test_going_on import undated
+from small_scan import small_scan, undated
 
 from acquisition.rig import open_devices
 from instrument.config import Loaded

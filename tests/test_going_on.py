@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import changed
-from small_scan import small_scan
+from small_scan import small_scan, undated
 from test_engine import Spy
 
 from acquisition.drift import Drift
@@ -37,11 +37,6 @@ def whole(small: Loaded, tmp_path_factory: pytest.TempPathFactory) -> list[Readi
             make_plan(small)
         )
         return undated(record.readings())
-
-
-def undated(readings: list[Reading]) -> list[Reading]:
-    """All but the date and a sum of times that is rounded otherwise; `time_s` stays."""
-    return [replace(r, time_utc="", free_s=0.0) for r in readings]
 
 
 def so_far(record: Record) -> SoFar:

@@ -28,8 +28,8 @@ from hypothesis.stateful import (
     rule,
     run_state_machine_as_test,
 )
-from small_scan import small_scan
-from test_going_on import so_far, undated
+from small_scan import small_scan, undated
+from test_going_on import so_far
 
 from acquisition.engine import Devices, Engine
 from acquisition.plan import Plan, make_plan

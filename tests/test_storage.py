@@ -14,8 +14,7 @@ from pathlib import Path
 
 import pytest
 from conftest import CONFIGS, ROOT, changed, gonio
-from small_scan import small_scan
-from test_going_on import undated
+from small_scan import small_scan, undated
 
 from acquisition.engine import Devices
 from acquisition.going_on import SoFar
