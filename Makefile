@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 # Six workers need not each read the files that have no such test.
-WAITING = $(shell grep -l 'pytest\.mark\.waits' tests/test_*.py)
+WAITING = $(shell grep -rl --include='test_*.py' 'pytest\.mark\.waits' tests)
 
 .PHONY: demo test lint clean
 

@@ -12,7 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from instrument.closing import Closing
+from instrument.closeable import Closing
 from instrument.errors import StorageError
 
 GO = "go\n"  # the word that the record is complete

@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from instrument.errors import GonioError, OperatorStop, StorageError
-from instrument.plain_text import harmless
+from instrument.text.terminal_safe import harmless
 
 # The program's arrays are small: threads of the linear algebra would only wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -103,7 +103,7 @@ def fit(
     """
     wanted = (format, sample, max_theta_deg, relative)
     asked = (source, models, robust, json, method, *wanted)
-    _do("fit_source", *asked, module="acquisition.fit_command")
+    _do("fit_source", *asked, module="acquisition.commands.fit")
 
 
 @app.command()
@@ -115,7 +115,7 @@ def report(folder: RunFolder, json: Json = False) -> None:
 RigOnly = Annotated[Path | None, typer.Option("--rig", help="The rig file.")]
 Yes = Annotated[bool, typer.Option("--yes", help="The rig is clear and may move: do not ask.")]
 AxisName = Annotated[str, typer.Argument(help="theta_i, dphi or theta_r.")]
-_BENCH = "acquisition.bench_commands"
+_BENCH = "acquisition.commands.setup"
 
 
 @app.command()
@@ -205,7 +205,7 @@ def stop_on_signals() -> None:
         signal.signal(number, interrupt)
 
 
-def _do(command: str, *arguments: object, module: str = "acquisition.run") -> None:
+def _do(command: str, *arguments: object, module: str = "acquisition.commands.scan") -> None:
     """Run a module's command; what can go wrong becomes a message and an exit code."""
     try:
         getattr(importlib.import_module(module), command)(*arguments)

@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 
 from acquisition.afterwards import GO
-from acquisition.run import report_run
+from acquisition.commands.scan import report_run
 from instrument.errors import GonioError
-from instrument.plain_text import harmless
+from instrument.text.terminal_safe import harmless
 
-NEEDED = ("acquisition.results", "matplotlib.figure", "matplotlib.backends.backend_svg")
+NEEDED = ("acquisition.results.finish", "matplotlib.figure", "matplotlib.backends.backend_svg")
 
 
 def main() -> None:

@@ -6,24 +6,24 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from acquisition.axis import Axis
-from acquisition.engine import Devices
-from drivers.hand_set import HandCoveredLamp, HandSetAxis
-from instrument.axis_config import AXES, HandAxis, SimulatedAxis, Wired
-from instrument.camera_config import V4l2Camera
+from acquisition.engine.axis import Axis
+from acquisition.engine.engine import Devices
+from drivers.manual import HandCoveredLamp, HandSetAxis
 from instrument.clock import Clock, SystemClock
-from instrument.closing import Closing
-from instrument.config import Loaded
+from instrument.closeable import Closing
+from instrument.config.axes import AXES, HandAxis, SimulatedAxis, Wired
+from instrument.config.camera import V4l2Camera
+from instrument.config.load import Loaded
+from instrument.config.rig import Rig
 from instrument.devices import Camera, Lamp, Operator, Stage
 from instrument.errors import InputError
-from instrument.rig_config import Rig
 from sim.clock import SimulatedClock
-from sim.faults import Faults
-from sim.operator import SimulatedOperator, SimulatedShutter
-from sim.scene import Scene
+from sim.faults.faults import Faults
+from sim.scene.operator import SimulatedOperator, SimulatedShutter
+from sim.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from sim.emulated import EmulatedBench
+    from sim.emulated.bench import EmulatedBench
 
 WORDS = {
     "theta_i": "the lamp's angle of incidence",
@@ -38,16 +38,16 @@ def prepare(loaded: Loaded) -> None:
     Raises `InputError` where a real rig has no terminal at which somebody serves it.
     """
     if loaded.rig.real:
-        from acquisition.terminal import require_terminal
+        from acquisition.terminal.operator import require_terminal
 
         require_terminal(str(loaded.protocol_path))
     see_emulated_camera(loaded.rig)
 
 
 def see_emulated_camera(rig: Rig) -> None:
-    """Start the program again, once, where its camera is emulated: see `sim.emulated`."""
+    """Start the program again, once, where its camera is emulated: see `sim.emulated.bench`."""
     if rig.emulated:
-        from sim.emulated import restart_with_camera
+        from sim.emulated.bench import restart_with_camera
 
         restart_with_camera()
 
@@ -56,7 +56,7 @@ def open_devices(loaded: Loaded, faults: Faults | None = None) -> Devices:
     """Open every device of the rig file, and close them all again if one cannot be opened.
 
     A scene that is simulated answers the operator's prompts; its devices have the `faults`, or
-    those of the environment: see `sim.faults`.
+    those of the environment: see `sim.faults.faults`.
     """
     with ExitStack() as opening:
         bench = opening.enter_context(Bench(loaded, faults))
@@ -70,7 +70,7 @@ class Bench(Closing):
     """What a rig file describes; each device is opened when it is asked for. Use it with `with`."""
 
     def __init__(self, loaded: Loaded, faults: Faults | None = None) -> None:
-        from drivers.opening import Lines
+        from drivers.factory import Lines
 
         self._faults = (faults or Faults.asked_for()) if loaded.rig.simulated else None
         self._rig, self._closing = loaded.rig, ExitStack()
@@ -94,13 +94,13 @@ class Bench(Closing):
     def camera(self) -> Camera:
         """The camera, open."""
         if isinstance(self._rig.camera, V4l2Camera):
-            from drivers.opening import open_camera
+            from drivers.factory import open_camera
 
             settings = self._rig.camera
             device = self._emulated.plug_camera(settings) if self._emulated else settings.device
             camera: Camera = open_camera(settings, device, self.clock)
         else:
-            from sim.camera import SimulatedCamera
+            from sim.scene.camera import SimulatedCamera
 
             camera = SimulatedCamera(self._simulated(), self.clock)
             camera = self._faults.camera(camera) if self._faults else camera
@@ -123,7 +123,7 @@ class Bench(Closing):
         if isinstance(settings, HandAxis):
             return HandSetAxis(name, WORDS[name], self.operator, settings.tolerance_deg)
         if isinstance(settings, SimulatedAxis):
-            from sim.stage import SimulatedStage
+            from sim.scene.stage import SimulatedStage
 
             scene = self._simulated()
             stage = SimulatedStage(name, settings, scene, self.clock)
@@ -131,14 +131,14 @@ class Bench(Closing):
         return self._driven(name, settings)
 
     def _driven(self, name: str, settings: Wired) -> Stage:
-        from drivers.opening import open_stage
+        from drivers.factory import open_stage
 
         port = self._emulated.plug_axis(name, settings) if self._emulated else settings.port
         return open_stage(name, settings, port, self._lines)
 
     def _operator(self) -> Operator:
         if self._scene is None:
-            from acquisition.terminal import TerminalOperator
+            from acquisition.terminal.operator import TerminalOperator
 
             return TerminalOperator()
         # In real time too nobody waits for an operator who is simulated.
@@ -153,7 +153,7 @@ class Bench(Closing):
         return self._faults.lamp(shutter) if self._faults else shutter
 
     def _emulate(self) -> EmulatedBench:
-        from sim.emulated import EmulatedBench
+        from sim.emulated.bench import EmulatedBench
 
         emulated = EmulatedBench(self._simulated(), self.clock)
         self._closing.callback(emulated.close)

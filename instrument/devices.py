@@ -1,7 +1,8 @@
 """Device interfaces: what the engine needs of a stage, a camera, a lamp and an operator.
 
 Real drivers and simulated devices fulfil these alike; nothing else in the program knows which
-one it talks to. Angles are the device's own degrees; `acquisition.axis` maps them to the rig's.
+one it talks to. Angles are the device's own degrees; `acquisition.engine.axis` maps them to the
+rig's.
 """
 
 from __future__ import annotations

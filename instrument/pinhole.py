@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from instrument.config.rig import Rig
 from instrument.geometry import FloatArray, camera_direction
-from instrument.rig_config import Rig
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,16 +1,13 @@
-"""Shared by all tests: the shipped configuration and what the command line asks for."""
+"""Options of the test run, and the fixtures that tests of several rooms share."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import subprocess
-import sys
-import time
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -18,39 +15,17 @@ from hypothesis import HealthCheck, settings
 # Before NumPy: the arrays are small, and threads that wait for one another cost twice the time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from instrument.config import Loaded, load_protocol
-from instrument.rig_config import Rig
+from instrument.config.load import Loaded, load_protocol
+from tests.support.paths import CONFIGS
 
 if TYPE_CHECKING:
-    from v4l2_rig import RemoteCamera
-
-ROOT = Path(__file__).resolve().parent.parent
-CONFIGS = ROOT / "configs"
+    from tests.support.v4l2.remote_camera import RemoteCamera
 
 # How fast an example runs depends on the machine: speed is tested as ratios, elsewhere.
 settings.register_profile(
     "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("any machine")
-
-
-def cpu_seconds(action: Callable[[], object], repeats: int) -> float:
-    """Least CPU time of one call: what else runs on the machine only adds to it."""
-    times = []
-    for _ in range(repeats):
-        start = time.process_time()
-        action()
-        times.append(time.process_time() - start)
-    return min(times)
-
-
-def gonio(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """Run the command from the project's folder, with nobody at its terminal."""
-    return subprocess.run(
-        [sys.executable, "-m", "acquisition", *map(str, arguments)],
-        cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
-        stdin=subprocess.DEVNULL,
-    )  # fmt: skip
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -76,7 +51,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 @pytest.fixture(scope="module")
 def remote(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RemoteCamera]:
     """A child process that sees the emulated V4L2 camera."""
-    from v4l2_rig import child
+    from tests.support.v4l2.remote_camera import child
 
     with child(tmp_path_factory) as one:
         yield one
@@ -89,19 +64,10 @@ def recorder(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     if compiler is None:
         pytest.skip("no C compiler: the write recorder cannot be made (Debian: gcc, libc6-dev)")
     library = tmp_path_factory.mktemp("recorder") / "write_recorder.so"
-    source = Path(__file__).with_name("write_recorder.c")
+    source = Path(__file__).with_name("support") / "storage" / "write_recorder.c"
     options = ["-O1", "-Wall", "-Werror", "-shared", "-fPIC"]
     subprocess.run([compiler, *options, "-o", library, source, "-ldl"], check=True, timeout=60)
     return {"LD_PRELOAD": str(library)}
-
-
-def small_demo(folder: Path) -> Path:
-    """The demo's protocol in that folder, with two incidences and nine view angles."""
-    text = (CONFIGS / "protocols" / "demo.yaml").read_text()
-    text = text.replace("[30.0, 45.0, 60.0]", "[30.0, 60.0]").replace("num: 33", "num: 9")
-    path = folder / "small.yaml"
-    path.write_text(text.replace("../rigs/", f"{CONFIGS / 'rigs'}/"))
-    return path
 
 
 @pytest.fixture
@@ -112,25 +78,3 @@ def slow(request: pytest.FixtureRequest) -> bool:
 @pytest.fixture(scope="session")
 def demo() -> Loaded:
     return load_protocol(CONFIGS / "protocols" / "demo.yaml")
-
-
-def changed(loaded: Loaded, rig: dict[str, Any] | None = None, **protocol: Any) -> Loaded:
-    """The same configuration with some entries replaced (not validated again)."""
-    return replace(
-        loaded,
-        rig=loaded.rig.model_copy(update=rig or {}),
-        protocol=loaded.protocol.model_copy(update=protocol),
-    )
-
-
-def exact_rig(rig: Rig) -> Rig:
-    """The rig as its file says it is: true angles, sample on the axis, a constant lamp."""
-    axes = rig.axes.model_copy(
-        update={
-            n: rig.axes[n].model_copy(update={"u_deg": 0.0}) for n in ("theta_i", "dphi", "theta_r")
-        }
-    )
-    simulation = rig.simulation.model_copy(
-        update={"sample_height_mm": 0.0, "lamp_drift_per_hour": 0.0}
-    )
-    return rig.model_copy(update={"axes": axes, "simulation": simulation})

@@ -7,15 +7,15 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from acquisition.benchmark.bench import Bench, MapPicture
 from acquisition.benchmark.effort import QUICK, WHOLE
-from acquisition.benchmark.files import empty_folder, write
 from acquisition.benchmark.machine import machine
+from acquisition.benchmark.output.files import empty_folder, write
 from acquisition.benchmark.peers import peers
-from acquisition.console import console, duration_text, out
+from acquisition.benchmark.result import Bench, MapPicture
+from acquisition.terminal.console import console, duration_text, out
 from instrument.errors import InputError
 
-MAPS = "acquisition.benchmark.maps"
+MAPS = "acquisition.benchmark.maps.maps"
 
 
 def run_bench(folder: Path, quick: bool, with_maps: bool) -> None:
@@ -25,7 +25,9 @@ def run_bench(folder: Path, quick: bool, with_maps: bool) -> None:
     """
     draw_maps = _drawer() if with_maps else None
     empty_folder(folder)
-    from acquisition.benchmark.studies import studies  # what is asked wrongly needs no SciPy
+    from acquisition.benchmark.studies.all_studies import (
+        studies,  # what is asked wrongly needs no SciPy
+    )
 
     effort, begun_s = QUICK if quick else WHOLE, time.monotonic()
     found = tuple(studies(effort, _tell))

@@ -10,16 +10,16 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 
 from analysis.models.base import Model, Parameter, add
-from analysis.models.beckmann_spizzichino import BECKMANN_SPIZZICHINO
-from analysis.models.diffuse import LAMBERT, OREN_NAYAR, OREN_NAYAR_QUALITATIVE
 from analysis.models.eon import EON
-from analysis.models.ggx import GGX, GGX_F90
 from analysis.models.minnaert import MINNAERT
-from analysis.models.oren_nayar_exact import OREN_NAYAR_EXACT
+from analysis.models.rough.oren_nayar import LAMBERT, OREN_NAYAR, OREN_NAYAR_QUALITATIVE
+from analysis.models.rough.oren_nayar_exact import OREN_NAYAR_EXACT
 from analysis.models.single_scattering import SINGLE_SCATTERING
-from analysis.models.specular import TORRANCE_SPARROW, TORRANCE_SPARROW_LOBE
-from analysis.models.unified import UNIFIED
-from analysis.models.wolff import WOLFF, WOLFF_OREN_NAYAR
+from analysis.models.smooth.wolff import WOLFF, WOLFF_OREN_NAYAR
+from analysis.models.specular.beckmann_spizzichino import BECKMANN_SPIZZICHINO
+from analysis.models.specular.ggx import GGX, GGX_F90
+from analysis.models.specular.torrance_sparrow import TORRANCE_SPARROW, TORRANCE_SPARROW_LOBE
+from analysis.models.specular.unified import UNIFIED
 
 __all__ = ["MODELS", "Model", "Parameter"]
 

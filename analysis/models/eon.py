@@ -15,8 +15,8 @@ import math
 import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity, kept
-from analysis.models.diffuse import ALBEDO
-from analysis.models.limits import GRAZING, both_graze, held
+from analysis.models.rough.oren_nayar import ALBEDO
+from analysis.models.validity import GRAZING, both_graze, held
 from instrument.geometry import FloatArray, Geometry
 
 ROUGHNESS = Parameter("roughness", "1", 0.0, 1.0, 0.3)

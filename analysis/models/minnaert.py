@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity
-from analysis.models.diffuse import ALBEDO
-from analysis.models.limits import held
+from analysis.models.rough.oren_nayar import ALBEDO
+from analysis.models.validity import held
 from instrument.geometry import FloatArray, Geometry
 
 K = Parameter("k", "1", 0.0, 2.0, 1.0)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity, kept
-from analysis.models.limits import GRAZING, both_graze, held
+from analysis.models.validity import GRAZING, both_graze, held
 from instrument.geometry import FloatArray, Geometry
 
 # A single-scattering albedo up to 1; above, light scattered more than once goes the same way.

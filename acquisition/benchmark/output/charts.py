@@ -1,0 +1,280 @@
+"""The charts of the bench, as SVG text: cost to the right, error upwards, better below and left.
+
+One style for all: a marker and a colour for each series, a thin line from the worst error down to
+the typical one, the Pareto front as a stepped line, a ring about the program's own choice.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from acquisition.benchmark.number_text import short
+from acquisition.benchmark.output.labels import Box, place
+from acquisition.benchmark.study import Study
+from acquisition.benchmark.trial import Trial, pareto_front
+from analysis.report.style import GREY, INK, style_of, svg_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+_SIZE = 7.5  # points, of labels
+_FRONT: dict[str, Any] = {"color": "#999999", "linewidth": 1.2, "zorder": 1}
+_PEER = "P"  # marker of other programs, in every chart
+
+MAIN = (("rough_surface", 1), ("window", 1), ("fit_misses", 2), ("scan", 0))
+"""Studies of the main chart, and which of their scenes it shows."""
+
+
+def study_chart(study: Study) -> str:
+    """All scenes of a study side by side, with one error axis."""
+    scenes = study.scenes
+    legend = _series_legend(study)
+    rows = -(-len(legend) // 4)
+
+    def draw(figure: Figure) -> None:
+        height = figure.get_size_inches()[1]
+        grid = {
+            "left": 0.075, "right": 0.985, "top": 1 - (0.32 + 0.21 * rows) / height,
+            "bottom": 0.5 / height, "wspace": 0.06,
+        }  # fmt: skip
+        axes = figure.subplots(1, len(scenes), sharey=True, squeeze=False, gridspec_kw=grid)[0]
+        limits = _limits(study.trials)
+        for ax, scene in zip(axes, scenes, strict=True):
+            _panel(ax, study, scene, limits, ax is axes[0])
+            ax.set_title(scene, color=INK, loc="left", pad=5)
+            ax.set_xlabel(study.cost_axis)
+        axes[0].set_ylabel(study.error_axis)
+        figure.legend(
+            handles=legend, loc="upper center", ncols=4, frameon=False, fontsize=8.5,
+            borderaxespad=0.1, handlelength=1.8, labelspacing=0.25,
+        )  # fmt: skip
+
+    return svg_of(4.1 + 0.21 * rows, draw, study.name)
+
+
+def main_chart(studies: Sequence[Study]) -> str:
+    """Four panels, one of each kind of choice: the chart of the README."""
+    known = {study.name: study for study in studies}
+    shown = [(known[name], min(n, len(known[name].scenes) - 1)) for name, n in MAIN]
+
+    def draw(figure: Figure) -> None:
+        grid = {
+            "left": 0.075, "right": 0.985, "top": 0.915, "bottom": 0.062, "wspace": 0.2,
+            "hspace": 0.33,
+        }  # fmt: skip
+        axes = figure.subplots(2, 2, squeeze=False, gridspec_kw=grid)
+        for ax, (study, n) in zip(axes.flat, shown, strict=True):
+            scene = study.scenes[n]
+            _panel(ax, study, scene, _limits(study.of(scene)))
+            ax.set_title(f"{study.title.partition(':')[0]}: {scene}", color=INK, loc="left", pad=5)
+            ax.set_xlabel(study.cost_axis)
+            ax.set_ylabel(study.error_axis)
+        figure.legend(
+            handles=_signs(peer=True), loc="upper center", ncols=5, frameon=False, fontsize=9
+        )
+
+    return svg_of(8.4, draw, "main")
+
+
+def alone(svg: str) -> str:
+    """An SVG of a page as a file of its own: white behind it, fonts that others have too."""
+    head, end, body = svg.partition(">")
+    fonts = '"DejaVu Sans", Verdana, Arial, sans-serif'.replace('"', "&quot;")
+    white = '<rect width="100%" height="100%" fill="white"/>'
+    return head + end + white + body.replace("'DejaVu Sans'", fonts)
+
+
+def _panel(
+    ax: Axes, study: Study, scene: str, limits: tuple[float, float], first: bool = True
+) -> None:
+    """One scene; the `first` of a row has the numbers of the error axis."""
+    trials = study.of(scene)
+    _scale(ax, study, limits)
+    _front(ax, trials, limits)
+    for number, series in enumerate(study.series):
+        own = [t for t in trials if t.series == series]
+        if study.joined:
+            _join(ax, own, number)
+        for trial in own:
+            _mark(ax, trial, number, limits)
+    _name(ax, study, trials, limits)
+    if first and any(t.error == 0 for t in trials):
+        ax.text(-0.015, 0, "0", transform=ax.transAxes, ha="right", va="center", size=9, color=INK)
+
+
+def _scale(ax: Axes, study: Study, limits: tuple[float, float]) -> None:
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    costs = [t.cost for t in study.trials]
+    few = math.log10(max(costs) / min(costs)) < 1.5
+    room = 1.4 if few else 3.0
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xlim(min(costs) / room, max(costs) * room)
+    ax.set_ylim(*limits)
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=12))
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: short(x)))
+    close = limits[1] < 100 * limits[0]
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if close else (1.0,), numticks=9))
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: short(y)))
+    ax.tick_params(labelsize=9)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_minor_locator(NullLocator())
+
+
+def _limits(trials: Sequence[Trial]) -> tuple[float, float]:
+    """Ends of the error axis; errors of nought lie on its lower end, infinite ones on the upper."""
+    pairs = [(t.error, min(t.error, t.error_median)) for t in trials]
+    errors = [e for pair in pairs for e in pair if 0 < e < math.inf]
+    low, high = min(errors, default=0.1), max(errors, default=1.0)
+    room = max((high / low) ** 0.08, 2.0)
+    for_nought = room**3 if any(t.error == 0 for t in trials) else 1.0
+    return low / room / for_nought, high * room
+
+
+def _within(value: float, limits: tuple[float, float]) -> float:
+    return min(max(value, limits[0]), limits[1])
+
+
+def _front(ax: Axes, trials: Sequence[Trial], limits: tuple[float, float]) -> None:
+    front = pareto_front(trials)
+    if not front:
+        return
+    x = [front[0].cost, *(t.cost for t in front), ax.get_xlim()[1]]
+    y = [limits[1], *(_within(t.error, limits) for t in front)]
+    ax.plot(x, [*y, y[-1]], drawstyle="steps-post", **_FRONT)
+
+
+def _join(ax: Axes, own: Sequence[Trial], number: int) -> None:
+    colour, _, dashes = style_of(number)
+    x, y = [t.cost for t in own], [t.error for t in own]
+    ax.plot(x, y, color=colour, linestyle=dashes, linewidth=1.0, zorder=2)
+
+
+def _mark(ax: Axes, trial: Trial, number: int, limits: tuple[float, float]) -> None:
+    colour, marker, _ = style_of(number)
+    error = _within(trial.error, limits)
+    if trial.bound:
+        ax.plot(trial.cost, error, ls="", marker="_", ms=8, mew=1.4, c=colour, zorder=3)
+        return
+    low = min(_within(trial.error_median, limits), error)
+    ax.plot([trial.cost] * 2, [low, error], color=colour, linewidth=0.8, zorder=2)
+    ax.plot(trial.cost, low, ls="", marker="_", ms=4, c=colour, zorder=2)
+    fill = "white" if trial.peer else colour
+    marker = _PEER if trial.peer else marker
+    ax.plot(
+        trial.cost, error, ls="", marker=marker, ms=6, c=colour, mfc=fill, mew=1.3, zorder=4,
+        clip_on=False,
+    )  # fmt: skip
+    if trial.default:
+        _ring(ax, trial.cost, error)
+
+
+def _ring(ax: Axes, x: float, y: float) -> None:
+    ax.plot(x, y, ls="", marker="o", ms=13, mfc="none", c=INK, mew=1.3, zorder=5, clip_on=False)
+
+
+def _name(ax: Axes, study: Study, trials: Sequence[Trial], limits: tuple[float, float]) -> None:
+    """Labels beside the marks, with a thin line where there is no room next to one."""
+    marks = [_at(ax, t.cost, _within(t.error, limits)) for t in trials]
+    texts = [_label(t, study, trials) for t in trials]
+    left, bottom = _at(ax, ax.get_xlim()[0], limits[0])
+    right, top = _at(ax, ax.get_xlim()[1], limits[1])
+    frame = Box(left + 1, bottom + 1, right - 1, top - 1)
+    found = place(marks, texts, frame, _SIZE, _lines(ax, trials, limits))
+    for mark, text, trial, placed in zip(marks, texts, trials, found, strict=True):
+        if text:
+            weight = "bold" if trial.default else "normal"
+            _write(ax, mark, placed.box, text, placed.far, weight)
+
+
+def _at(ax: Axes, x: float, y: float) -> tuple[float, float]:
+    """A place of the data in points of the figure."""
+    to_points = ax.transData - ax.figure.dpi_scale_trans
+    at = 72 * to_points.transform((x, y))
+    return float(at[0]), float(at[1])
+
+
+def _lines(ax: Axes, trials: Sequence[Trial], limits: tuple[float, float]) -> list[Box]:
+    """What labels had better not cover: rings, the lines to the medians, the front."""
+    boxes = []
+    for t in trials:
+        x, y = _at(ax, t.cost, _within(t.error, limits))
+        if t.default:
+            boxes.append(Box(x - 8, y - 8, x + 8, y + 8))
+        low = _at(ax, t.cost, min(_within(t.error_median, limits), _within(t.error, limits)))[1]
+        boxes.append(Box(x - 1, low, x + 1, y))
+    front = [_at(ax, t.cost, _within(t.error, limits)) for t in pareto_front(trials)]
+    if not front:
+        return boxes
+    right, top = _at(ax, ax.get_xlim()[1], limits[1])
+    boxes.append(Box(front[0][0] - 1, front[0][1], front[0][0] + 1, top))
+    for (x, y), (to_x, to_y) in zip(front, [*front[1:], (right, front[-1][1])], strict=True):
+        boxes += [Box(x, y - 1, to_x, y + 1), Box(to_x - 1, to_y, to_x + 1, y)]
+    return boxes
+
+
+def _write(
+    ax: Axes, mark: tuple[float, float], box: Box, text: str, far: bool, weight: str
+) -> None:
+    line: dict[str, Any] = {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0}
+    line["shrinkB"] = 4
+    ax.annotate(
+        text, xy=mark, xycoords="figure points",
+        xytext=((box.left + box.right) / 2, (box.bottom + box.top) / 2),
+        textcoords="figure points", ha="center", va="center_baseline", size=_SIZE, color=INK,
+        weight=weight, zorder=6, arrowprops=line if far else None, annotation_clip=False,
+        bbox={"fc": "white", "ec": "none", "pad": 0.4, "alpha": 0.75},
+    )  # fmt: skip
+
+
+def _label(trial: Trial, study: Study, trials: Sequence[Trial]) -> str:
+    """The method's name; of limits, that of their kind, once, beside the default."""
+    if trial.bound:
+        beside = any(t.default and t.cost == trial.cost for t in trials)
+        return trial.series if beside else ""
+    if trial.default:
+        return f"{trial.label} (default)"
+    return "" if study.joined else trial.label
+
+
+def _series_legend(study: Study) -> list[Line2D]:
+    from matplotlib.lines import Line2D
+
+    handles = []
+    for number, series in enumerate(study.series):
+        colour, marker, dashes = style_of(number)
+        own = [t for t in study.trials if t.series == series]
+        peer = all(t.peer for t in own)
+        fill = "white" if peer else colour
+        shape = "_" if all(t.bound for t in own) else _PEER if peer else marker
+        line = dashes if study.joined else ""
+        handles.append(
+            Line2D([], [], ls=line, marker=shape, ms=6, c=colour, mfc=fill, mew=1.3, label=series)
+        )
+    return handles + _signs(error_is=study.error_is)
+
+
+def _signs(error_is: str = "worst", peer: bool = False) -> list[Line2D]:
+    """What front, ring and thin line mean."""
+    from matplotlib.lines import Line2D
+
+    found = [
+        Line2D([], [], color="#999999", linewidth=1.2, label="Pareto front"),
+        Line2D(
+            [], [], ls="", marker="o", ms=10, mfc="none", c=INK, mew=1.3, label="program’s default"
+        ),
+        Line2D([], [], ls="", marker="|", ms=11, c=GREY, label=f"{error_is} (mark) to median"),
+    ]
+    if peer:
+        found.append(
+            Line2D([], [], ls="", marker=_PEER, ms=7, c=INK, mfc="white", label="another program")
+        )
+        found.append(
+            Line2D([], [], ls="", marker="_", ms=8, mew=1.4, c=INK, label="limit (Cramér–Rao)")
+        )
+    return found

@@ -1,0 +1,141 @@
+"""What `gonio fit` does: read, fit, choose, and say so."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from rich import box
+from rich.table import Table
+
+from acquisition.results.model_check import check_model
+from acquisition.results.sources import Source, Wanted, read_source
+from acquisition.results.summary import VERDICTS, parameters_of, validity_note, value_text
+from acquisition.terminal.console import out
+from analysis.choice.choice import Choice, choose
+from analysis.choice.fit_json import nothing, to_json
+from analysis.choice.ladder import METHODS, MethodOfFit
+from analysis.fit.fit import FitResult
+from instrument.errors import InputError, NotDetermined
+
+
+def fit_source(
+    path: Path,
+    models: str | None,
+    robust: bool,
+    as_json: bool,
+    method: str,
+    *wanted: *tuple[str, int | None, float, bool],
+) -> None:
+    """Fit what is `wanted` of a source (the fields of `Wanted`) and print the outcome.
+
+    `method`: for the rough surface, one of `analysis.choice.ladder.METHODS`.
+    Raises `InputError` for what is wrong with it, and `NotDetermined`, after printing, where the
+    data do not determine the chosen model's parameters, or are too few for any fit.
+    """
+    names, way = _names(models), _method(method, models)
+    try:
+        source = read_source(path, Wanted(*wanted))
+        choice = choose(source.measurements, source.acceptance, names, robust, way)
+    except NotDetermined as error:
+        if as_json:
+            _print_json(nothing(str(error)))
+        raise
+    if as_json:
+        _print_json(to_json(choice))
+    else:
+        _print(source, choice)
+    if choice.verdict == "not identifiable":
+        raise NotDetermined(f"{path}: {choice.reason}")
+
+
+def _names(models: str | None) -> list[str] | None:
+    """Names of models parted by commas; None: those of the ladder."""
+    if models is None:
+        return None
+    names = [name.strip() for name in models.split(",")]
+    wrong = [words for words in (check_model(name, None) for name in names) if words]
+    if wrong:
+        raise InputError(*(f"--models: {words}" for words in wrong))
+    if len(set(names)) < len(names):
+        raise InputError(f"--models: {models}: a model stands twice; name each once")
+    return names
+
+
+def _method(method: str, models: str | None) -> MethodOfFit:
+    """How the rough surface is worked out. A model's name says its method."""
+    for known in METHODS:
+        if method == known:
+            if models is not None and known != "auto":
+                raise InputError(
+                    f"--method: {method}; allowed: auto, as --models names the methods"
+                )
+            return known
+    raise InputError(f"--method: {method}; allowed: {', '.join(METHODS)}")
+
+
+def _print_json(fit: dict[str, object]) -> None:
+    sys.stdout.write(json.dumps(fit, allow_nan=False) + "\n")
+
+
+def _print(source: Source, choice: Choice) -> None:
+    chosen = next((c for c in choice.candidates if c.model == choice.chosen), None)
+    if chosen is None:
+        out.print(f"{choice.verdict}: {choice.reason}", highlight=False)
+        return
+    out.print(f"{chosen.model}: {VERDICTS[choice.verdict]}.", highlight=False)
+    parameters = Table("parameter", "value ± u (k = 1)")
+    for parameter in parameters_of(chosen):
+        parameters.add_row(parameter.name, value_text(parameter))
+    out.print(parameters)
+    out.print(_table(choice.candidates, chosen))
+    for note in (*source.notes, choice.reason, str(choice.symmetry), *_notes(source, chosen)):
+        out.print(f"- {note}", highlight=False)
+
+
+def _table(candidates: Sequence[FitResult], chosen: FitResult) -> Table:
+    """The candidates by rising BIC; K is the number of parameters, ✗ what did not converge."""
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for name in ("  candidate", "K", "rms/mean", "χ²/dof", "ΔBIC", "ΔAICc"):
+        table.add_column(name, no_wrap=True)
+    best_bic = min(c.bic for c in candidates)
+    best_aicc = min(c.aicc for c in candidates)
+    for c in sorted(candidates, key=lambda c: c.bic):
+        chi2 = "" if c.reduced_chi2 is None else _short(c.reduced_chi2)
+        mark = "→" if c is chosen else "" if c.converged else "✗"
+        row = (f"{100 * c.rms_relative:.3g} %", chi2, _short(c.bic - best_bic))
+        table.add_row(f"{mark:1} {c.model}", str(c.x.size), *row, _short(c.aicc - best_aicc))
+    return table
+
+
+def _short(number: float) -> str:
+    """At most six characters."""
+    if abs(number) < 10:
+        return f"{number:.2f}"
+    return f"{number:.0f}" if number < 1e6 else f"{number:.0e}"
+
+
+def _notes(source: Source, chosen: FitResult) -> list[str]:
+    """What else one should know of the fit."""
+    m, found = source.measurements, []
+    if m.u_random is None:
+        percent = 100 * float(np.mean(chosen.u_total)) / float(np.mean(m.brdf))
+        found.append(
+            f"no u is stated: the noise is estimated from the residuals, {percent:.2g} % of the "
+            "mean; every u rests on it"
+        )
+    beyond = validity_note(chosen)
+    if beyond:
+        found.append(beyond)
+    if m.relative:
+        found.append("the values are relative: what only scales them is not determined")
+    for k in np.flatnonzero(chosen.outliers)[:10]:
+        where = f"theta_i {m.theta_i_deg[k]:g}, theta_r {m.theta_r_deg[k]:g}"
+        found.append(
+            f"set aside: {where}, dphi {m.dphi_deg[k]:g} degrees ({chosen.residuals[k]:+.1f} u)"
+        )
+    found.append(f"the search ended: {chosen.message}")
+    return found

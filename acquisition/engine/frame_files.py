@@ -1,0 +1,53 @@
+"""The frames that a protocol asks to keep: one file each, written whole before the row names it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+from acquisition.plan.plan import Plan
+from instrument.config.load import Loaded
+from instrument.devices import Frame
+from instrument.errors import InputError, StorageError
+from instrument.text.atomic_file import make_folder, trouble, write_whole
+
+FOLDER = "frames"
+
+
+def keep(frames: Sequence[Frame], step: int, run: Path) -> tuple[str, ...]:
+    """Write raw counts as TIFF under the run's folder; returns the names relative to it.
+
+    Raises `StorageError` where the disk does not take them.
+    """
+    import cv2
+
+    names = tuple(f"{FOLDER}/{step:06d}-{number:04d}.tiff" for number in range(len(frames)))
+    try:
+        make_folder(run / FOLDER)
+        for name, frame in zip(names, frames, strict=True):
+            write_whole(run / name, cv2.imencode(".tiff", frame.image)[1].tobytes())
+    except OSError as error:
+        raise StorageError(f"{run / FOLDER}: {trouble(error, run)}") from error
+    return names
+
+
+def kept_bytes(plan: Plan, loaded: Loaded) -> int:
+    """What the kept frames of a whole scan need on disk; 0 where none are kept."""
+    camera = loaded.rig.camera
+    if not loaded.protocol.keep_frames:
+        return 0
+    frame = camera.width_px * camera.height_px * (1 if camera.bit_depth == 8 else 2)
+    return frame * sum(step.frames for step in plan.steps)
+
+
+def require_room(plan: Plan, loaded: Loaded, folder: Path) -> None:
+    """Raise `InputError` where the frames to be kept do not fit on the run's disk."""
+    needed = kept_bytes(plan, loaded)
+    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    free = shutil.disk_usage(there).free
+    if needed > free:
+        raise InputError(
+            f"{loaded.protocol_path}: keep_frames: the frames need {needed / 1e9:.2f} GB, and "
+            f"{there} has {free / 1e9:.2f} GB free: name another disk with --out, or keep none"
+        )

@@ -1,0 +1,121 @@
+"""The report of a run: everything that it shows, gathered from record, reduction and fit."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+
+import numpy as np
+
+from acquisition.results.fitting import Fitted
+from acquisition.results.reduction import Reduced
+from acquisition.results.summary import Budget, parameters_of
+from analysis.fit.fit import FitResult
+from analysis.report.data import Candidate, Curve, ReportData
+from instrument.config.axes import AXES
+from instrument.config.load import Loaded
+from instrument.config.rig import Rig
+from instrument.geometry import FloatArray, Geometry
+from instrument.record.record import Record
+
+Rows = tuple[tuple[str, str], ...]
+
+
+def report_data(
+    reduced: Reduced,
+    fitted: Fitted,
+    budget: Budget,
+    words: tuple[str, tuple[str, ...]],
+    record: Record,
+    loaded: Loaded,
+) -> ReportData:
+    """Everything that the report shows; `words` are the headline and the notes."""
+    protocol, points = loaded.protocol, reduced.points
+    size, patch = protocol.sample, protocol.window
+    return ReportData(
+        title=protocol.name,
+        sample=f"{size.name}, {size.width_mm:g} × {size.height_mm:g} mm; measured on the same "
+        f"{patch.width_mm:g} × {patch.height_mm:g} mm of it at every view angle",
+        description=protocol.description,
+        verdict=words[:1],
+        verdict_kind=fitted.choice.verdict if fitted.choice else "",
+        notes=words[1],
+        theta_i_deg=np.array([p.theta_i_deg for p in points]),
+        dphi_deg=np.array([p.dphi_deg for p in points]),
+        theta_r_deg=np.array([p.theta_r_deg for p in points]),
+        brdf=reduced.brdf,
+        u_brdf=fitted.u_brdf(reduced),
+        radiance=reduced.radiance,
+        u_radiance=reduced.u_radiance,
+        flags=reduced.flags,
+        fitted=fitted.used if fitted.choice else np.zeros(len(points), dtype=bool),
+        candidates=candidates(fitted),
+        budget=budget,
+        previews=tuple(record.previews()),
+        rig=_rig_rows(loaded.rig),
+        devices=tuple(record.devices().items()),
+        versions=_version_rows(record),
+        times=_time_rows(record),
+    )
+
+
+def candidates(fitted: Fitted) -> tuple[Candidate, ...]:
+    """All candidates, as the report shows them."""
+    if fitted.choice is None:
+        return ()
+    return tuple(
+        Candidate(
+            name=result.model,
+            parameters=parameters_of(result),
+            rms_relative=result.rms_relative,
+            reduced_chi2=result.reduced_chi2,
+            bic=result.bic,
+            converged=result.converged,
+            chosen=result.model == fitted.choice.chosen,
+            message=result.message,
+            residuals=result.residuals,
+            curve=_curve(result),
+        )
+        for result in fitted.choice.candidates
+    )
+
+
+def _curve(result: FitResult) -> Curve:
+    def curve(theta_i_deg: float, dphi_deg: float, theta_r_deg: FloatArray) -> FloatArray:
+        geometry = Geometry.from_degrees(theta_i=theta_i_deg, theta_r=theta_r_deg, dphi=dphi_deg)
+        return result.brdf(geometry)
+
+    return curve
+
+
+def _rig_rows(rig: Rig) -> Rows:
+    camera = rig.camera
+    axes = [(n, f"{rig.axes[n].driver}, u {rig.axes[n].u_deg:g}° (k = 1)") for n in AXES]
+    return (
+        ("rig", f"{rig.name}: {rig.description}" if rig.description else rig.name),
+        ("beam", f"{rig.beam_length_mm:g} mm"),
+        ("lamp", f"at {rig.lamp_distance_mm:g} mm, {rig.source_solid_angle_sr:g} sr"),
+        ("lens", f"{rig.receiver_solid_angle_sr:g} sr"),
+        (
+            "camera",
+            f"{camera.width_px} × {camera.height_px} pixels, {camera.bit_depth} bit, "
+            f"{camera.field_width_mm:g} mm wide at the axis",
+        ),
+        *axes,
+        ("sample on the axis", f"u {rig.u_placement_mm:g} mm (k = 1)"),
+    )
+
+
+def _version_rows(record: Record) -> Rows:
+    packages = ("gonio", "numpy", "scipy", "opencv-contrib-python-headless", "matplotlib")
+    scanned = ("gonio, when scanned", record.meta("program_version") or "unknown")
+    return (scanned, *((name, version(name)) for name in packages))
+
+
+def _time_rows(record: Record) -> Rows:
+    words = {
+        "started_utc": "started (UTC)",
+        "finished_utc": "finished (UTC)",
+        "planned_s": "planned (s)",
+        "scan_s": "took (s)",
+    }
+    return tuple((text, record.meta(key) or "unknown") for key, text in words.items())

@@ -1,0 +1,128 @@
+"""What `gonio fit` can read: a run's folder, a CSV table, a folder of the CUReT database."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.commands.scan import as_used
+from acquisition.results.fitting import measurements
+from acquisition.results.reduction import reduce
+from analysis.data.acceptance import Acceptance
+from analysis.data.csv_table import read_csv
+from analysis.data.curet import read_curet
+from analysis.data.measurements import Measurements
+from instrument.errors import InputError, NotDetermined
+from instrument.record.record import FILE_NAME, Record
+
+_LEAST_MEAN = 1e-15  # no light at all: nothing to be relative to
+FORMATS = ("auto", "run", "csv", "curet")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Measurements, the rig's acceptance where it is known, and what was left out, in words."""
+
+    measurements: Measurements
+    acceptance: Acceptance | None
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What of a source is to be fitted: `sample` of a database, angles up to `max_theta_deg`.
+
+    `relative`: the values are tied to no reference. `format` is one of FORMATS.
+    """
+
+    format: str = "auto"
+    sample: int | None = None
+    max_theta_deg: float = 90.0
+    relative: bool = False
+
+
+def read_source(path: Path, wanted: Wanted) -> Source:
+    """Read what is wanted. Raises `InputError` for what is wrong, `NotDetermined` for no points."""
+    _check(wanted)
+    kind = _kind(path) if wanted.format == "auto" else wanted.format
+    if (wanted.sample is not None) != (kind == "curet"):
+        raise InputError(
+            f"--sample: {'missing' if kind == 'curet' else wanted.sample} for the format {kind}; "
+            "it names a material of the curet format, and only there"
+        )
+    if kind == "curet":
+        source = _curet(path, wanted)
+    else:
+        source = _run(path) if kind == "run" else Source(read_csv(path), None, ())
+        source = _cut(source, wanted.max_theta_deg)
+    if wanted.relative:
+        source = replace(source, measurements=_made_relative(path, source.measurements))
+    if source.measurements.size == 0:
+        raise NotDetermined(f"{path}: no point is left to fit")
+    return source
+
+
+def _check(wanted: Wanted) -> None:
+    if wanted.format not in FORMATS:
+        raise InputError(f"--format: {wanted.format}; allowed: {', '.join(FORMATS)}")
+    if not 0 < wanted.max_theta_deg <= 90:
+        raise InputError(
+            f"--max-theta-deg: {wanted.max_theta_deg:g} degrees; allowed: above 0, up to 90 degrees"
+        )
+
+
+def _kind(path: Path) -> str:
+    if not path.is_dir():
+        return "csv"
+    if (path / FILE_NAME).exists():
+        return "run"
+    raise InputError(
+        f"{path}: a folder without {FILE_NAME} is no run; name a run's folder or a CSV file, or "
+        "say --format curet --sample N for a folder of the CUReT database"
+    )
+
+
+def _run(path: Path) -> Source:
+    with Record.open(path) as record:
+        loaded = as_used(record)
+        reduced = reduce(record.readings(), loaded.protocol)
+    if not np.any(reduced.sound):
+        raise NotDetermined(f"{path}: no geometry has been measured yet that could be fitted")
+    flagged = int(np.sum(~reduced.sound))
+    note = (f"{flagged} of {reduced.sound.size} points are flagged and not fitted",)
+    acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
+    try:
+        found = measurements(reduced, loaded)
+    except ValueError as error:  # values that are no measurement, such as a u of 0
+        raise NotDetermined(f"{path}: {error}") from None
+    return Source(found, acceptance, note if flagged else ())
+
+
+def _curet(path: Path, wanted: Wanted) -> Source:
+    found = read_curet(path, wanted.sample or 0, wanted.max_theta_deg)
+    used, asked = found.measurements.size, found.directions - found.beyond
+    note = (
+        f"sample {wanted.sample}: {used} of {asked} directions up to {wanted.max_theta_deg:g} "
+        f"degrees; {found.negative} negative and {found.zero} zero values masked"
+    )
+    return Source(found.measurements, None, (note,))
+
+
+def _cut(source: Source, max_theta_deg: float) -> Source:
+    m = source.measurements
+    inside = np.maximum(m.theta_i_deg, np.abs(m.theta_r_deg)) <= max_theta_deg
+    if np.all(inside):
+        return source
+    note = f"{int(np.sum(~inside))} of {m.size} points lie beyond {max_theta_deg:g} degrees"
+    return replace(source, measurements=m.of(inside), notes=(*source.notes, note))
+
+
+def _made_relative(path: Path, m: Measurements) -> Measurements:
+    if m.size and not np.mean(m.brdf) > _LEAST_MEAN:
+        raise InputError(
+            f"{path}: brdf: mean {np.mean(m.brdf):g}; allowed for relative values: more than "
+            f"{_LEAST_MEAN:g}"
+        )
+    return replace(m, relative=True)

@@ -1,0 +1,65 @@
+"""The choice of a model as `fit.json` holds it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from analysis.choice.choice import Choice
+from analysis.choice.symmetry_test import Symmetry
+from analysis.fit.fit import FitResult
+
+
+def to_json(choice: Choice) -> dict[str, Any]:
+    """The choice as `fit.json` holds it: for `json.dumps(..., allow_nan=False)`."""
+    return {
+        "chosen": choice.chosen,
+        "verdict": choice.verdict,
+        "reason": choice.reason,
+        "symmetry": None if choice.symmetry is None else _symmetry(choice.symmetry),
+        "candidates": [_candidate(c) for c in choice.candidates],
+    }
+
+
+def nothing(reason: str) -> dict[str, Any]:
+    """What is written where no model could be fitted."""
+    return {
+        "chosen": None,
+        "verdict": "not identifiable",
+        "reason": reason,
+        "symmetry": None,
+        "candidates": [],
+    }
+
+
+def _candidate(result: FitResult) -> dict[str, Any]:
+    return {
+        "model": result.model,
+        "parameters": {name: _parameter(result, name) for name in result.values},
+        "rms_relative": _number(result.rms_relative),
+        "reduced_chi2": _number(result.reduced_chi2),
+        "bic": _number(result.bic),
+        "aicc": _number(result.aicc),
+        "converged": result.converged,
+        "message": result.message,
+    }
+
+
+def _symmetry(tested: Symmetry) -> dict[str, Any]:
+    return {
+        "says": tested.says,
+        "pairs": tested.pairs,
+        "asymmetry": _number(tested.asymmetry),
+        "probability": _number(tested.probability),
+    }
+
+
+def _parameter(result: FitResult, name: str) -> dict[str, Any]:
+    entry: dict[str, Any] = {"value": _number(result.values[name]), "u": _number(result.u[name])}
+    if name in result.intervals:
+        entry["interval"] = [_number(end) for end in result.intervals[name]]
+    return entry
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)

@@ -1,0 +1,98 @@
+"""Structure in residuals: what a model leaves in a row on one side is no noise.
+
+Source: A. Wald, J. Wolfowitz, "On a Test Whether Two Samples Are from the Same Population", Annals
+of Mathematical Statistics 11 (1940): the number of runs of equal signs.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import ndtr
+
+from analysis.data.measurements import IntArray, Measurements
+from analysis.data.sweeps import Sweep, in_plane, sweeps
+from instrument.geometry import FloatArray
+
+# A stretch counts as a failure from this many standard deviations of its mean.
+_NOTABLE = 3.0
+
+
+def runs_probability(m: Measurements, residuals: FloatArray) -> float:
+    """Of as few runs of equal signs as this or fewer, in all sweeps together, if all is noise.
+
+    `residuals` (N,) belong to the points; 1 where no sweep has residuals of both signs. Few points
+    or alternating residuals give 1: only runs that are too long speak against a model.
+    """
+    counted = [_runs(residuals[sweep.points]) for sweep in sweeps(m)]
+    runs, expected, variance = np.sum(np.reshape(counted, (-1, 3)), axis=0)
+    if variance <= 0:
+        return 1.0
+    return float(ndtr((runs + 0.5 - expected) / math.sqrt(variance)))
+
+
+def _runs(residuals: FloatArray) -> tuple[float, float, float]:
+    """Runs of equal signs in a row of residuals, and their expectation and variance."""
+    sign = np.sign(residuals[residuals != 0])
+    n, plus = sign.size, int(np.sum(sign > 0))
+    if n < 2:
+        return 0.0, 0.0, 0.0
+    runs = 1 + int(np.sum(sign[1:] != sign[:-1]))
+    pairs = 2 * plus * (n - plus)
+    return runs, pairs / n + 1, pairs * (pairs - n) / (n * n * (n - 1))
+
+
+class Stretch(NamedTuple):
+    """Neighbours of a sweep that a model misses on one side; `mean` residual in units of u."""
+
+    theta_i_deg: float
+    dphi_deg: float
+    from_deg: float
+    to_deg: float
+    mean: float
+    weight: float
+
+    def __str__(self) -> str:
+        where = f"theta_r {self.from_deg:g}"
+        if self.to_deg != self.from_deg:
+            where += f" to {self.to_deg:g}"
+        return (
+            f"theta_i {self.theta_i_deg:g}, dphi {self.dphi_deg:g} degrees: {where} degrees "
+            f"({self.mean:+.2g} u)"
+        )
+
+
+def failures(m: Measurements, residuals: FloatArray, most: int = 3) -> list[Stretch]:
+    """Where a model fails worst, the worst first; `residuals` (N,) in units of u, 0: set aside.
+
+    The weight of a stretch is its mean residual over what noise would leave of it.
+    """
+    plane, views = in_plane(m)
+    swept = sweeps(m)
+    inside = np.concatenate([s.points for s in swept]) if swept else np.zeros(0, dtype=np.int64)
+    alone = np.setdiff1d(np.arange(m.size), inside)
+    single = [Sweep(float(m.theta_i_deg[k]), float(plane[k]), np.array([k])) for k in alone]
+    found = [
+        _stretch(sweep, part, views, residuals)
+        for sweep in (*swept, *single)
+        for part in _one_sided(sweep.points, residuals)
+    ]
+    found.sort(key=lambda stretch: -stretch.weight)
+    return [s for n, s in enumerate(found[:most]) if n == 0 or s.weight > _NOTABLE]
+
+
+def _one_sided(points: IntArray, residuals: FloatArray) -> list[IntArray]:
+    points = points[residuals[points] != 0]
+    if points.size == 0:
+        return []
+    sign = residuals[points] > 0
+    return np.split(points, np.flatnonzero(sign[1:] != sign[:-1]) + 1)
+
+
+def _stretch(sweep: Sweep, points: IntArray, views: FloatArray, residuals: FloatArray) -> Stretch:
+    mean = float(np.mean(residuals[points]))
+    ends = views[points[0]], views[points[-1]]
+    weight = abs(mean) * math.sqrt(points.size)
+    return Stretch(sweep.theta_i_deg, sweep.dphi_deg, float(ends[0]), float(ends[1]), mean, weight)

@@ -1,0 +1,46 @@
+"""Sweeps of a scan: points of one incidence in one plane, by rising view angle."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from analysis.data.measurements import IntArray, Measurements
+from instrument.geometry import FloatArray
+
+_DECIMALS = 3  # degrees that agree to this many are one setting
+
+
+class Sweep(NamedTuple):
+    """theta_i and dphi (0 to below 180) in degrees, and the points' places by rising theta_r."""
+
+    theta_i_deg: float
+    dphi_deg: float
+    points: IntArray
+
+
+def sweeps(m: Measurements) -> list[Sweep]:
+    """All sweeps of two points and more, by incidence and plane."""
+    plane, views = in_plane(m)
+    settings = np.stack([np.round(m.theta_i_deg, _DECIMALS), plane], axis=1)
+    values, member = np.unique(settings, axis=0, return_inverse=True)
+    found = []
+    for n, (theta_i, dphi) in enumerate(values):
+        points = np.flatnonzero(member.reshape(-1) == n)
+        if points.size > 1:
+            order = np.argsort(views[points], kind="stable")
+            found.append(Sweep(float(theta_i), float(dphi), points[order]))
+    return found
+
+
+def in_plane(m: Measurements) -> tuple[FloatArray, FloatArray]:
+    """dphi in degrees, 0 to below 180, and theta_r with the sign that it has in that plane."""
+    azimuth = np.mod(np.round(m.dphi_deg, _DECIMALS), 360.0)
+    over = azimuth >= 180.0
+    return np.where(over, azimuth - 180.0, azimuth), np.where(over, -m.theta_r_deg, m.theta_r_deg)
+
+
+def signed_view(m: Measurements) -> FloatArray:
+    """theta_r in degrees, (N,), positive on the side of its plane's dphi below 180 degrees."""
+    return in_plane(m)[1]

@@ -1,0 +1,163 @@
+"""Fresnel reflectance of a smooth interface: dielectrics and metals, by polarisation.
+
+What to use when: `unpolarised` for natural light; `polarised` for a lamp or a camera behind a
+polariser; `transmittance` where 1 - F is wanted near grazing (the difference would lose digits);
+`wolff_polynomial` only to compare with work that used it.
+
+The index is that of the far side over that of the near side, n - ik with k >= 0 for an absorbing
+far side (a field ~ exp(+i omega t)). With n + ik every amplitude is the complex conjugate, and
+every reflectance the same.
+
+Sources: S. K. Nayar, K. Ikeuchi, T. Kanade, "Surface Reflection: Physical and Geometrical
+Perspectives", IEEE PAMI 13 (1991), equations (12), (13), (41)-(43); L. B. Wolff, S. K. Nayar,
+M. Oren, "Improved Diffuse Reflection Models for Computer Vision", IJCV 30 (1998), equation (2).
+Both are rearranged so that no two nearly equal numbers are subtracted: at normal incidence, at
+grazing and for an index near 1 they keep all digits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.models.validity import polar
+from instrument.geometry import FloatArray
+
+ComplexArray = NDArray[np.complex128]
+
+
+def amplitudes(theta: ArrayLike, index: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+    """Field reflection coefficients (F_para, F_perp): 1991, equations (12) and (13).
+
+    `theta` in radians, 0 to pi/2; `index` real or complex; both broadcast. Y is the index (errata:
+    not "almost zero" for a dielectric). With q = sqrt(Y^2 - sin^2 theta) the numerators are
+
+        Y^2 cos - q = (Y^2 - 1)(Y^2 cos^2 - sin^2) / (Y^2 cos + q)      (12)
+        cos - q     = (1 - Y^2) / (cos + q)                             (13)
+    """
+    theta, Y = polar("theta", theta), _checked(index)
+    c, s, Y2_1 = np.cos(theta), np.sin(theta), (Y - 1) * (Y + 1)
+    q2 = np.where(s < c, (Y - s) * (Y + s), Y2_1 + c * c)  # near the critical angle it is small
+    q = np.conj(np.sqrt(np.conj(q2) + 0j))  # a real index is n - 0i
+    Y2 = Y * Y
+    para = Y2_1 * ((Y2 + 1) * c * c - 1) / np.square(Y2 * c + q)
+    perp = -Y2_1 / np.square(c + q)
+    return para, perp
+
+
+def reflectances(theta: ArrayLike, index: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Energy reflectances (F'_para, F'_perp) = |F|^2: 1991, equation (41). 1 in total reflection.
+
+    `theta` in radians, 0 to pi/2; `index` real or complex; both broadcast. To 1e-12, but for a
+    ten-millionth of a radian about the critical angle: |F|^2 starts there as a square root, and
+    the rounding of theta itself changes more.
+    """
+    para, perp = (_squared_modulus(f) for f in amplitudes(theta, index))
+    total = np.isreal(index) & (np.sin(theta) > np.real(index))
+    return np.where(total, 1.0, para), np.where(total, 1.0, perp)
+
+
+def polarised(theta: ArrayLike, index: ArrayLike, h: ArrayLike) -> FloatArray:
+    """F' = h F'_para + v F'_perp with v = 1 - h: 1991, equations (42) and (43).
+
+    `h` is the part of the energy whose field lies in the plane of incidence: 0 to 1.
+    Raises `ValueError` for an h outside.
+    """
+    h = np.asarray(h, dtype=np.float64)
+    if not np.all((h >= 0) & (h <= 1)):
+        raise ValueError(f"h = {_first(h, (h >= 0) & (h <= 1)):g}; allowed: 0 to 1")
+    para, perp = reflectances(theta, index)
+    return h * para + (1 - h) * perp
+
+
+def unpolarised(theta: ArrayLike, index: ArrayLike) -> FloatArray:
+    """F(theta, n) of natural light: 1998, equation (2), which is (42) with h = v = 1/2.
+
+    Defined at theta = 0 too, where (2) as printed is 0/0 (errata). 1 beyond the critical angle.
+    """
+    return polarised(theta, index, 0.5)
+
+
+def transmittance(theta: ArrayLike, n: ArrayLike) -> FloatArray:
+    """1 - F(theta, n) of natural light into a dielectric with real n >= 1, to full precision.
+
+    `theta` is the angle on the outer side, in radians. The same light path backwards has the same
+    transmittance: 1 - F(theta, n) = 1 - F(asin(sin(theta)/n), 1/n), both factors of 1998 (7).
+    """
+    c, n, q = _cosines(theta, n)
+    n2 = n * n
+    result: FloatArray = 2 * c * q * (1 / np.square(c + q) + n2 / np.square(n2 * c + q))
+    return result
+
+
+def transmittance_slope(theta: ArrayLike, n: ArrayLike) -> FloatArray:
+    """Derivative of `transmittance` by n. It grows without limit at grazing where n = 1.
+
+    By dq/dn = n/q: d(F_perp)/dn = -2 n c / (q (c + q)^2) and
+    d(F_para)/dn = 2 n c (2 q^2 - n^2) / (q (n^2 c + q)^2).
+    """
+    c, n, q = _cosines(theta, n)
+    d_perp = -2 * n * c / (q * np.square(c + q))
+    d_para = 2 * n * c * (2 * q * q - n * n) / (q * np.square(n * n * c + q))
+    return _chained(c, n, q, d_perp, d_para)
+
+
+def transmittance_slope_by_cosine(theta: ArrayLike, n: ArrayLike) -> FloatArray:
+    """Derivative of `transmittance` by cos(theta).
+
+    By dq/dc = c/q: d(F_perp)/dc = 2 (n^2 - 1) / (q (c + q)^2) and
+    d(F_para)/dc = 2 n^2 (n^2 - 1) / (q (n^2 c + q)^2).
+    """
+    c, n, q = _cosines(theta, n)
+    n2, n2_1 = n * n, (n - 1) * (n + 1)
+    d_perp = 2 * n2_1 / (q * np.square(c + q))
+    d_para = 2 * n2 * n2_1 / (q * np.square(n2 * c + q))
+    return _chained(c, n, q, d_perp, d_para)
+
+
+def _chained(
+    c: FloatArray, n: FloatArray, q: FloatArray, d_perp: FloatArray, d_para: FloatArray
+) -> FloatArray:
+    """-(F_perp d(F_perp) + F_para d(F_para)): the derivative of 1 - (F_perp^2 + F_para^2)/2."""
+    n2_1 = (n - 1) * (n + 1)
+    perp = -n2_1 / np.square(c + q)
+    para = n2_1 * ((n * n + 1) * c * c - 1) / np.square(n * n * c + q)
+    result: FloatArray = -(perp * d_perp + para * d_para)
+    return result
+
+
+def wolff_polynomial(theta: ArrayLike, epsilon: float = 0.07) -> FloatArray:
+    """Wolff's polynomial for F: 1998, after (7): ((2 theta/pi)^5 + epsilon) / (1 + epsilon).
+
+    `theta` in radians; `epsilon`, which stands for n, 0 or more. It is coarse: with 0.07, against
+    the exact F of n = 1.5, it is 0.025 too high at normal incidence (0.065 for 0.040) and up to
+    0.20 too high, at 79 degrees.
+    """
+    if not 0 <= epsilon < np.inf:
+        raise ValueError(f"epsilon = {epsilon:g}; allowed: 0 or more")
+    fifth = np.power(polar("theta", theta) * (2 / np.pi), 5)
+    return np.asarray((fifth + epsilon) / (1 + epsilon), dtype=np.float64)
+
+
+def _cosines(theta: ArrayLike, n: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """cos(theta), n and q = n cos(theta_t) = sqrt(n^2 - sin^2 theta)."""
+    c, n = np.cos(polar("theta", theta)), np.asarray(n, dtype=np.float64)
+    if not np.all(n >= 1):
+        raise ValueError(f"n = {_first(n, n >= 1):g}; allowed: 1 or more")
+    return c, n, np.sqrt((n - 1) * (n + 1) + c * c)
+
+
+def _squared_modulus(f: ComplexArray) -> FloatArray:
+    return np.asarray(np.minimum(np.square(f.real) + np.square(f.imag), 1.0))
+
+
+def _checked(index: ArrayLike) -> NDArray[np.complex128]:
+    Y = np.asarray(index, dtype=np.complex128)
+    fine = np.isfinite(Y) & (Y.real > 0)
+    if not np.all(fine):
+        raise ValueError(f"index = {Y[~fine].flat[0]}; allowed: finite, real part above 0")
+    return Y
+
+
+def _first(values: FloatArray, fine: NDArray[np.bool_]) -> float:
+    return float(values[~fine].flat[0])

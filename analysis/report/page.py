@@ -1,0 +1,386 @@
+"""The report of a run: one HTML file that needs nothing else, to read on screen or on paper.
+
+`write_report` is all that others need. Every text from outside is escaped on its way in.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import math
+import struct
+from collections.abc import Iterable
+from pathlib import Path
+
+from analysis.report import charts
+from analysis.report.data import Candidate, Parameter, ReportData, Rows, Sweep, sweeps_of
+from analysis.report.style import CSS, format_value
+from instrument.record.reading import Preview
+from instrument.text.atomic_file import write_whole
+
+_STATES = {
+    "adequate": ("adequate", "✔ Adequate: the model explains the data"),
+    "none adequate": ("warning", "✘ No model explains the data within their uncertainty"),
+    "not identifiable": ("warning", "? The data do not determine every parameter"),
+}
+_NO_TILE = (
+    "No white tile was measured, so there is no BRDF: the radiance is relative, in counts per "
+    "second of this camera, lamp and lens. Its shape can be trusted, its height means nothing."
+)
+_PNG_HEADER = struct.Struct(">8s4x4sII")
+
+
+def write_report(path: Path, data: ReportData) -> None:
+    """Write the report; a reader of `path` sees the old file or the whole new one, never a part."""
+    write_whole(path, report_html(data))
+
+
+def report_html(data: ReportData) -> str:
+    """The report as the text of an HTML page; the same data give the same text."""
+    sweeps = sweeps_of(data)
+    body = [
+        _head(data, sweeps),
+        _verdict(data),
+        _attention(data),
+        _charts(data, sweeps),
+        _candidates(data),
+        _flagged(data),
+        _budget(data),
+        _pictures(data.previews),
+        _facts(data),
+    ]
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{_text(data.title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n"
+        + "\n".join(part for part in body if part)
+        + "\n</body>\n</html>\n"
+    )
+
+
+def _text(words: str) -> str:
+    """Words from outside, harmless in HTML and in XML."""
+    visible = "".join(c if c.isprintable() or c in "\n\t\u00a0" else "\ufffd" for c in words)
+    return html.escape(visible)
+
+
+def _number(value: float | None, form: str) -> str:
+    return "—" if value is None or not math.isfinite(value) else format(value, form)
+
+
+def _head(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
+    lines = [f"<header>\n<h1>{_text(data.title)}</h1>"]
+    if data.sample:
+        lines.append(f'<p class="sample">Sample: <b>{_text(data.sample)}</b></p>')
+    if data.description:
+        lines.append(f'<p class="text">{_text(data.description)}</p>')
+    return "\n".join([*lines, f'<p class="soft">{_counts(data, sweeps)}</p>\n</header>'])
+
+
+def _counts(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
+    incidences = {s.incidence: f"{round(s.theta_i_deg, 1):g}°" for s in sweeps}
+    planes = {s.plane: f"{s.plane_deg:g}°" for s in sweeps}
+    parts = [f"{len(data.flags)} geometries measured"]
+    if sweeps:
+        parts.append("lamp at " + ", ".join(incidences[i] for i in sorted(incidences)))
+        parts.append("planes Δφ = " + ", ".join(planes.values()) if len(planes) > 1 else "")
+    parts.append(f"{int(data.fitted.sum())} in the fit")
+    flagged = int(data.flagged.sum())
+    parts.append(f"<b>{flagged} flagged</b>" if flagged else "none flagged")
+    return " · ".join(part for part in parts if part)
+
+
+def _verdict(data: ReportData) -> str:
+    kind, state = _STATES.get(data.verdict_kind, ("", ""))
+    headline, *more = data.verdict or ("No model was fitted.",)
+    chosen = next((c for c in data.candidates if c.chosen), None)
+    values = []
+    if chosen is not None:
+        found = ((_text(p.name), _value_of(p)) for p in chosen.parameters)
+        values = [_big(*pair) for pair in found]
+    return "\n".join(
+        [
+            f'<section id="verdict" class="verdict {kind}">',
+            f'<div class="state">{state}</div>' if state else "",
+            f'<p class="headline">{_text(headline)}</p>',
+            *(f"<p>{_text(sentence)}</p>" for sentence in more),
+            f'<dl class="values">{"".join(values)}</dl>' if values else "",
+            "</section>",
+        ]
+    )
+
+
+def _big(label: str, value: str) -> str:
+    return f"<div><dt>{label}</dt><dd>{value}</dd></div>"
+
+
+def _name(candidate: Candidate) -> str:
+    return _text(candidate.name).replace("+", "+<wbr>")
+
+
+def _value_of(parameter: Parameter) -> str:
+    if parameter.u is None and parameter.interval is not None:
+        low, high = (_number(end, ".4g") for end in parameter.interval)
+        unit = f"\u00a0{parameter.unit}" if parameter.unit else ""
+        return _text(f"not determined, in [{low}, {high}]{unit}")
+    return _text(format_value(parameter.value, parameter.u, parameter.unit))
+
+
+def _attention(data: ReportData) -> str:
+    notes = [*data.notes, *((_NO_TILE,) if data.flags and not data.has_brdf else ())]
+    if not notes:
+        return ""
+    items = "".join(f"<li>{_text(note)}</li>" for note in notes)
+    return f'<section id="notes" class="attention notes"><b>Notes</b><ul>{items}</ul></section>'
+
+
+def _charts(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
+    if not sweeps:
+        return '<h2 id="shape">Measured values</h2>\n<p>No geometry gave a value to draw.</p>'
+    name = "BRDF" if data.has_brdf else "Radiance"
+    quantity = "BRDF (1/sr)" if data.has_brdf else "radiance (counts/s)"
+    return "\n".join(
+        [
+            '<h2 id="shape">Shape of the reflection</h2>',
+            _figure(
+                charts.normalised_charts(sweeps), "normalised radiance", _shape_words(data, sweeps)
+            ),
+            f'<h2 id="brdf">{name} at each incidence</h2>',
+            _figure([charts.brdf_chart(sweeps, quantity)], quantity, _panel_words(data, sweeps)),
+            f'<h2 id="polar">{name} around the sample</h2>',
+            _figure(
+                [charts.polar_chart(sweeps, quantity)],
+                f"{quantity}, polar",
+                _polar_words(data, sweeps, quantity),
+            ),
+        ]
+    )
+
+
+def _figure(drawings: list[str], label: str, caption: str) -> str:
+    named = f'<svg role="img" aria-label="{_text(label)}" '
+    drawn = "".join(svg.replace("<svg ", named, 1) for svg in drawings)
+    return f"<figure>\n{drawn}<figcaption>{caption}</figcaption>\n</figure>"
+
+
+def _shape_words(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
+    words = [
+        "Radiance divided by its value straight above the sample (θᵣ = 0), against the view "
+        "angle. Positive θᵣ is the lamp’s side. Bars: standard uncertainty u (k = 1), often "
+        "smaller than the dots.",
+    ]
+    if any(s.in_plane for s in sweeps):
+        words.append("▼ marks the lamp’s direction, θᵣ = θᵢ.")
+    if any(not s.in_plane for s in sweeps):
+        words.append("Δφ is the azimuth of positive θᵣ, counted from the lamp’s.")
+    if data.drawn:
+        words.append(f"Lines: <b>{_text(data.drawn[0].name)}</b>{_scaled(data)}.")
+    if any(c.chosen and c.residuals is not None for c in data.candidates):
+        words.append(
+            "Below: (measured − model) / u, with the errors that points share (tile, lamp angle, "
+            "placement) taken out at their likeliest values; the grey band is ±2, where about "
+            "95 % of the dots belong. A pattern through many dots is no noise: the model is wrong."
+        )
+    return " ".join([*words, _mark_words(data)])
+
+
+def _scaled(data: ReportData) -> str:
+    return "" if data.has_brdf else ", each scaled to its dots"
+
+
+def _mark_words(data: ReportData) -> str:
+    words = "Crossed dots are flagged." if data.flagged.any() else ""
+    left_out = ~data.fitted & ~data.flagged
+    if left_out.any() and data.fitted.any():
+        words += " Hollow dots did not enter the fit."
+    return words.strip()
+
+
+def _panel_words(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
+    kinds = ("Solid line", "Dashed", "Dotted")
+    drawn = [f"{kind}: <b>{_text(c.name)}</b>" for kind, c in zip(kinds, data.drawn, strict=False)]
+    if drawn:
+        drawn[0] += " (chosen)" if data.drawn[0].chosen else ""
+        drawn = [f"{'; '.join(drawn)}{_scaled(data)}."]
+    if len(sweeps) > charts.MOST_PANELS:
+        drawn.append(f"{charts.MOST_PANELS} of {len(sweeps)} sweeps are shown.")
+    if data.drawn and data.drawn[0].residuals is not None:
+        drawn.append("Dots may stand off a line together by an error that they share.")
+    return " ".join(["Bars: u (k = 1).", *drawn, _mark_words(data)])
+
+
+def _polar_words(data: ReportData, sweeps: tuple[Sweep, ...], quantity: str) -> str:
+    words = (
+        f"The distance from the sample is the {quantity}, the direction is the camera’s: straight "
+        "up is θᵣ = 0, to the right is the lamp’s side. A matte (Lambertian) sample would give a "
+        "half circle."
+    )
+    words += " Arrows come from the lamp." if any(s.in_plane for s in sweeps) else ""
+    return words + (" Flagged points are left out." if data.flagged.any() else "")
+
+
+def _candidates(data: ReportData) -> str:
+    if not data.candidates:
+        return ""
+    known = [c.bic for c in data.candidates if c.bic is not None and math.isfinite(c.bic)]
+    best = min(known, default=None)
+    head = _row(
+        ("Model", "Parameters ± u (k = 1)", "#Residual, rms", "#Reduced χ²", "#ΔBIC"),
+        cell="th",
+    )
+    word = "✔ chosen" if data.verdict_kind == "adequate" else "best of these"
+    rows = "".join(_candidate(c, best, word) for c in data.ranked)
+    return (
+        '<h2 id="candidates">Models compared</h2>\n'
+        f'<div class="wide"><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>\n'
+        '<p class="soft">Reduced χ² near 1: the model agrees with the data within their '
+        "uncertainty. ΔBIC: how far a model stands behind the best one, every parameter "
+        "charged for. A bracket holds every value that the data allow (95 %).</p>"
+    )
+
+
+def _candidate(candidate: Candidate, best_bic: float | None, word: str) -> str:
+    above = math.nan
+    if candidate.bic is not None and best_bic is not None:
+        above = candidate.bic - best_bic
+    tag = f'<br><span class="tag">{word}</span>' if candidate.chosen else ""
+    if not candidate.converged:
+        tag += f'<br><span class="soft">did not converge: {_text(candidate.message)}</span>'
+    parameters = "".join(
+        f'<span class="parameter"><span class="name">{_text(p.name)}</span> {_value_of(p)}</span>'
+        for p in candidate.parameters
+    )
+    rms = candidate.rms_relative
+    cells = (
+        _name(candidate) + tag,
+        parameters,
+        "#" + (f"{_number(100 * rms, '.3g')} %" if math.isfinite(rms) else "—"),
+        "#" + _number(candidate.reduced_chi2, ".3g"),
+        "#" + _number(above, ".3g" if abs(above) >= 1000 else ".1f"),
+    )
+    return _row(cells, "chosen" if candidate.chosen else "")
+
+
+def _row(cells: Iterable[str], style: str = "", cell: str = "td") -> str:
+    """A table row of finished HTML; a cell that begins with # holds a number."""
+    made = (
+        f'<{cell} class="number">{c[1:]}</{cell}>' if c.startswith("#") else f"<{cell}>{c}</{cell}>"
+        for c in cells
+    )
+    return f'<tr class="{style}">{"".join(made)}</tr>' if style else f"<tr>{''.join(made)}</tr>"
+
+
+def _flagged(data: ReportData) -> str:
+    at = [i for i, flag in enumerate(data.flags) if flag]
+    if not at:
+        return ""
+    value, u = (data.brdf, data.u_brdf) if data.has_brdf else (data.radiance, data.u_radiance)
+    unit = "1/sr" if data.has_brdf else "counts/s"
+    rows = "".join(
+        _row(
+            (
+                f"#{_number(data.theta_i_deg[i], 'g')}°",
+                f"#{_number(data.dphi_deg[i], 'g')}°",
+                f"#{_number(data.theta_r_deg[i], 'g')}°",
+                f"#{format_value(float(value[i]), float(u[i]), unit)}",
+                _text(data.flags[i]),
+            )
+        )
+        for i in at
+    )
+    head = _row(("#θᵢ", "#Δφ", "#θᵣ", "#Value ± u (k = 1)", "Flag"), cell="th")
+    return (
+        '<h2 id="flagged">Flagged points</h2>\n'
+        '<p class="soft">Drawn with a cross; those far off may lie outside a chart.</p>\n'
+        f'<div class="wide"><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>'
+    )
+
+
+def _budget(data: ReportData) -> str:
+    if not data.budget:
+        return ""
+    head = _row(("Where it comes from", "#Relative u, median", "#Share of variance", ""), cell="th")
+    rows = "".join(
+        _row((_text(name), f"#{_percent(u)}", f"#{_number(share, '.0f')} %", _bar(share)))
+        for name, u, share in data.budget
+    )
+    return (
+        '<h2 id="budget">Uncertainty budget</h2>\n'
+        '<p class="soft">Standard uncertainty (k = 1) of a point, relative to its value.</p>\n'
+        f'<div class="wide"><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>'
+    )
+
+
+def _percent(value: float) -> str:
+    return "< 0.0001 %" if 0 < value < 1e-4 else f"{_number(value, '.2g')} %"
+
+
+def _bar(share: float) -> str:
+    width = min(max(share, 0.0), 100.0) if math.isfinite(share) else 0.0
+    return (
+        '<svg class="share" viewBox="0 0 100 6" preserveAspectRatio="none">'
+        '<rect width="100" height="6" fill="#eee"/>'
+        f'<rect width="{width:.1f}" height="6" fill="#555"/></svg>'
+    )
+
+
+def _pictures(previews: tuple[Preview, ...]) -> str:
+    if not previews:
+        return ""
+    return (
+        '<h2 id="pictures">What the camera saw</h2>\n'
+        '<p class="soft">The outline is the window whose pixels were averaged: the same area of '
+        'the sample at every angle.</p>\n<div class="pictures">'
+        + "".join(map(_picture, previews))
+        + "</div>"
+    )
+
+
+def _picture(preview: Preview) -> str:
+    caption = f"<figcaption>{_text(preview.caption)}</figcaption>"
+    size = _png_size(preview.png)
+    if size is None:
+        return f"<figure><p>This picture cannot be read.</p>{caption}</figure>"
+    # The centre of a pixel is at a whole number; in SVG a pixel begins there.
+    corners = " ".join(
+        f"{x + 0.5:.2f},{y + 0.5:.2f}"
+        for x, y in preview.polygon
+        if math.isfinite(x) and math.isfinite(y)
+    )
+    outline = f'<polygon points="{corners}" fill="none" vector-effect="non-scaling-stroke"'
+    png = base64.b64encode(preview.png).decode("ascii")
+    return (
+        f'<figure><svg viewBox="0 0 {size[0]} {size[1]}" role="img" aria-label="camera picture">'
+        f'<image width="{size[0]}" height="{size[1]}" href="data:image/png;base64,{png}"/>'
+        f'{outline} stroke="#000" stroke-width="4"/>{outline} stroke="#fff" stroke-width="1.8"/>'
+        f"</svg>{caption}</figure>"
+    )
+
+
+def _png_size(png: bytes) -> tuple[int, int] | None:
+    """Width and height in pixels from a PNG's header; None where it is not one."""
+    if len(png) < _PNG_HEADER.size:
+        return None
+    signature, chunk, width, height = _PNG_HEADER.unpack_from(png)
+    known = signature == b"\x89PNG\r\n\x1a\n" and chunk == b"IHDR" and width and height
+    return (width, height) if known else None
+
+
+def _facts(data: ReportData) -> str:
+    tables = (
+        ("rig", "Rig", data.rig),
+        ("devices", "Devices", data.devices),
+        ("times", "Times", data.times),
+        ("versions", "Versions", data.versions),
+    )
+    found = "".join(_fact(*table) for table in tables if table[2])
+    return (
+        f'<h2 id="facts">How it was measured</h2>\n<div class="facts">{found}</div>'
+        if found
+        else ""
+    )
+
+
+def _fact(name: str, title: str, rows: Rows) -> str:
+    body = "".join(_row((_text(label), _text(value))) for label, value in rows)
+    return f'<section id="{name}"><h3>{title}</h3><table><tbody>{body}</tbody></table></section>'

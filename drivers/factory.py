@@ -1,0 +1,117 @@
+"""Opens the driver that a rig file names; axes on the same port share its line."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from typing import TYPE_CHECKING
+
+from drivers.lines.serial_line import Line
+from drivers.stages.motor_stage import Limits, MotorStage
+from instrument.clock import Clock
+from instrument.closeable import Closing
+from instrument.config.axes import NewportAxis, OrientalAxis, Wired, ZaberAxis
+from instrument.config.camera import V4l2Camera
+from instrument.devices import Camera
+
+if TYPE_CHECKING:
+    from drivers.lines.modbus_bus import ModbusBus
+    from drivers.lines.modbus_client import BusSettings
+
+
+class Lines(Closing):
+    """The open ports, each once; use it with `with`."""
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock = clock
+        self._serial: dict[str, Line] = {}
+        self._modbus: dict[str, ModbusBus] = {}
+        self._closing = ExitStack()
+
+    def close(self) -> None:
+        """Let go of all of it; safe twice."""
+        self._closing.close()
+
+    def serial(self, who: str, port: str, baudrate: int, xonxoff: bool = False) -> Line:
+        """The line of a serial port, opened for whoever asks first."""
+        if port not in self._serial:
+            line = Line(who, port, baudrate, xonxoff)
+            self._closing.callback(line.close)
+            self._serial[port] = line
+        return self._serial[port]
+
+    def modbus(self, who: str, settings: BusSettings) -> ModbusBus:
+        """The bus of a Modbus port, opened for whoever asks first."""
+        from drivers.lines.modbus_bus import ModbusBus
+
+        if settings.port not in self._modbus:
+            bus = ModbusBus(who, settings)
+            self._closing.callback(bus.close)
+            self._modbus[settings.port] = bus
+        return self._modbus[settings.port]
+
+
+def open_stage(name: str, axis: Wired, port: str, lines: Lines) -> MotorStage:
+    """The stage of an axis. Raises `DeviceError` where another device or none answers."""
+    if isinstance(axis, NewportAxis):
+        return _newport(name, axis, port, lines)
+    if isinstance(axis, ZaberAxis):
+        return _zaber(name, axis, port, lines)
+    return _oriental(name, axis, port, lines)
+
+
+def _newport(name: str, axis: NewportAxis, port: str, lines: Lines) -> MotorStage:
+    from drivers.stages.newport import BAUDRATE, NewportStage
+
+    model = axis.model
+    line = lines.serial(name, port, BAUDRATE[model], xonxoff=model == "SMC100")
+    return NewportStage(name, line, axis.address, model, _limits(axis), lines.clock)
+
+
+def _zaber(name: str, axis: ZaberAxis, port: str, lines: Lines) -> MotorStage:
+    from drivers.stages.zaber import BAUDRATE, ZaberStage
+
+    line = lines.serial(name, port, BAUDRATE)
+    device, number, per_deg = axis.device, axis.axis, axis.microsteps_per_deg
+    return ZaberStage(name, line, device, number, per_deg, _limits(axis), lines.clock)
+
+
+def _oriental(name: str, axis: OrientalAxis, port: str, lines: Lines) -> MotorStage:
+    from drivers.stages.oriental import OrientalSettings, OrientalStage
+
+    settings = OrientalSettings(
+        port, axis.steps_per_deg, _limits(axis), axis.baudrate, axis.parity, axis.unit
+    )
+    return OrientalStage(name, settings, lines.clock, lines.modbus(name, settings.bus))
+
+
+def _limits(axis: Wired) -> Limits:
+    low, high = axis.device_limits_deg()
+    return Limits(
+        low,
+        high,
+        axis.speed_deg_per_s,
+        axis.acceleration_deg_per_s2,
+        axis.tolerance_deg,
+        axis.homing_s,
+        axis.to_device_deg(axis.home_deg),
+    )
+
+
+def open_camera(camera: V4l2Camera, device: str, clock: Clock) -> Camera:
+    """The camera. Raises `DeviceError` where it cannot do what the rig file asks for."""
+    from drivers.v4l2.camera import V4l2Camera as Driver
+    from drivers.v4l2.camera import V4l2Settings
+
+    settings = V4l2Settings(
+        device,
+        camera.pixel_format,
+        camera.width_px,
+        camera.height_px,
+        camera.bit_depth,
+        camera.min_exposure_s,
+        camera.max_exposure_s,
+        camera.gain,
+        exposure_delay_frames=camera.exposure_delay_frames,
+        frames_per_s=camera.frames_per_s,
+    )
+    return Driver(settings, clock)

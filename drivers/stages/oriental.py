@@ -1,0 +1,244 @@
+"""A rotary stage behind an Oriental Motor AZ drive: Modbus RTU, or Modbus TCP through a gateway.
+
+No move is ever sent twice on a guess: when the answer to one is lost, the drive is first asked
+whether it has taken it.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from drivers.lines.modbus_bus import Lost, ModbusBus, ModbusUnit, patience
+from drivers.lines.modbus_client import BusSettings
+from drivers.lines.serial_line import REPLY_S
+from drivers.stages.motor_stage import POLL_S, STARTS_WITHIN_S, Limits, MotorStage, Status, Stopped
+from drivers.stages.oriental_framing import (
+    DIRECT_DATA,
+    DIRECT_DATA_COUNT,
+    FEEDBACK_POSITION,
+    FULL_CURRENT,
+    HOME_END,
+    INPUT_WORD,
+    MOVE,
+    OUTPUT,
+    OUTPUT_AND_ALARM_COUNT,
+    READY,
+    STOP,
+    ZHOME,
+    Output,
+    degrees_of,
+    direct_data_of,
+    move_block,
+    output_of,
+    steps_of,
+    unlike_az,
+    value_of,
+)
+from instrument.clock import Clock
+from instrument.errors import DeviceError, InputError
+
+log = logging.getLogger(__name__)
+
+_RESYNC_COUNTS = (6, 8, 10, 12, 14)  # of the direct data; no other request here has these lengths
+
+
+@dataclass(frozen=True, slots=True)
+class OrientalSettings:
+    """Where the drive is and what it turns.
+
+    `port`: a serial device's path, or `tcp://host:port` of a gateway. `steps_per_deg` follows from
+    the gear and the drive's electronic gear. `current` counts 0.1 %. `reply_s`: seconds.
+    """
+
+    port: str
+    steps_per_deg: float
+    limits: Limits
+    baudrate: int = 115200
+    parity: Literal["E", "N", "O"] = "E"
+    unit: int = 1
+    current: int = FULL_CURRENT
+    reply_s: float = REPLY_S
+
+    def __post_init__(self) -> None:
+        if not self.steps_per_deg > 0:
+            raise InputError(f"steps_per_deg: {self.steps_per_deg:g}: it must be above 0")
+        if self.limits.tolerance_deg < 0.5 / self.steps_per_deg:
+            raise InputError(
+                f"tolerance_deg: {self.limits.tolerance_deg:g} deg: less than half a step "
+                f"({0.5 / self.steps_per_deg:g} deg) cannot be kept"
+            )
+        if not 0 < self.current <= FULL_CURRENT:
+            raise InputError(f"current: {self.current}: 1 to {FULL_CURRENT}, in 0.1 %, is allowed")
+
+    @property
+    def bus(self) -> BusSettings:
+        """The line, which other drives may share."""
+        return BusSettings(self.port, self.baudrate, self.parity, self.reply_s)
+
+
+class OrientalStage(MotorStage):
+    """One AZ drive. Drives on one port are given one `bus`, which whoever opened it closes.
+
+    `found`: what its registers said when it was opened.
+    """
+
+    def __init__(
+        self, name: str, settings: OrientalSettings, clock: Clock, bus: ModbusBus | None = None
+    ) -> None:
+        super().__init__(name, settings.limits, clock)
+        self._settings = settings
+        self._bus = bus or ModbusBus(name, settings.bus)
+        self._owns_bus = bus is None
+        self._drive = ModbusUnit(self._bus, name, settings.unit, DIRECT_DATA, _RESYNC_COUNTS)
+        self._stops, self._cleared = 0, -1  # stops sent; how many of them are cleared in 007D
+        try:
+            self.found, self._target_steps = self._identify()
+        except BaseException:
+            self.close()
+            raise
+
+    def identity(self) -> str:
+        """What answers: it has no name or serial number, so the unit tells two drives apart."""
+        return f"Oriental Motor AZ drive, by its registers, unit {self._settings.unit}"
+
+    def status(self, patient: bool = True) -> Status:
+        """Where the stage is, by its own feedback, and what its drive says of itself."""
+        until_s = patience() if patient else time.monotonic()
+        output = self._output(until_s)  # before the position: once it stands, that is the last one
+        return Status(
+            degrees_of(self._feedback(until_s), self._settings.steps_per_deg),
+            moving=output.has(MOVE),
+            homed=output.has(HOME_END),
+            fault=output.fault,
+        )
+
+    def close(self) -> None:
+        """Let go of the line; safe twice."""
+        self._watchdog.end()
+        if self._owns_bus:
+            self._bus.close()
+
+    def _own_limits_deg(self) -> tuple[float, float]:
+        """None are known: where an AZ drive keeps its software limits is not in our sources."""
+        return -float("inf"), float("inf")
+
+    def _identify(self) -> tuple[str, int]:
+        """What answers, and the target that it holds; refused unless like an AZ drive."""
+        until_s = patience()
+        output = self._output(until_s)
+        data = direct_data_of(self._drive.read(DIRECT_DATA, DIRECT_DATA_COUNT, until_s))
+        wrong = unlike_az(data, output)
+        if wrong:
+            raise DeviceError(
+                f"{self.name}: {self._drive.where} is no Oriental Motor AZ drive: {wrong}: look at "
+                "the port and the unit address in the rig file"
+            )
+        alarm = f"alarm {output.alarm:02X}h" if output.alarm else "no alarm"
+        return f"output {output.word:04X} hex, {alarm}, {data}", data.position
+
+    def _send_home(self) -> None:
+        self._await_ready("look for its reference")
+        self._set_inputs(ZHOME)
+        self._set_inputs(0)
+
+    def _apply_speed(self) -> None:
+        """Every move brings its own."""
+
+    def _send_move(self, angle_deg: float) -> None:
+        scale, limits = self._settings.steps_per_deg, self._limits
+        target = steps_of(angle_deg, scale)
+        block = move_block(
+            target,
+            steps_of(limits.speed_deg_per_s, scale),
+            steps_of(limits.acceleration_deg_per_s2, scale),
+            self._settings.current,
+        )
+        self._await_ready("move")
+        until_s, before = patience(), self._target_steps
+        self._write_once(DIRECT_DATA, block, lambda: self._took(target, before, until_s), until_s)
+        self._target_steps = target
+
+    def _send_stop(self) -> None:
+        self._stops += 1  # before it is sent: whoever moves next must clear it
+        try:
+            self._drive.write_at_once(INPUT_WORD, STOP)
+        except Lost as lost:
+            raise type(lost)(f"{lost}; STOP was not acknowledged: it may still move") from lost
+
+    def _await_ready(self, what: str) -> Output:
+        """Take back an earlier stop, and wait until the drive would take a command."""
+        stops = self._stops
+        if self._cleared != stops:
+            self._set_inputs(0)
+            self._cleared = stops
+        begun_s = self._clock.now_s()
+        while not (output := self._output(patience())).has(READY):
+            self._refuse_stopped()
+            if output.fault:
+                raise DeviceError(f"{self.name}: {output.fault}")
+            if self._clock.now_s() - begun_s > STARTS_WITHIN_S:
+                raise DeviceError(
+                    f"{self.name}: its drive is not ready to {what} (output {output.word:04X} hex, "
+                    "READY is bit 5): look at its motor's supply, and at its STOP and FREE inputs"
+                )
+            self._clock.sleep(POLL_S)
+        return output
+
+    def _set_inputs(self, word: int) -> None:
+        """Set the input word; setting it to what it is already makes no edge and starts nothing."""
+        until_s = patience()
+
+        def taken() -> bool:
+            return self._drive.read(INPUT_WORD, 1, until_s) == [word]
+
+        self._write_once(INPUT_WORD, (word,), taken, until_s)
+
+    def _took(self, target: int, before: int, until_s: float) -> bool:
+        """Whether a move whose answer was lost was executed; asks until it is known."""
+        data = direct_data_of(self._drive.read(DIRECT_DATA, DIRECT_DATA_COUNT, until_s))
+        self._target_steps = data.position
+        if data.position != target or before != target:
+            return data.position == target
+        # The same target as before: only what the stage does can tell.
+        if self._output(until_s).has(MOVE):
+            return True
+        allowed = self._limits.tolerance_deg * self._settings.steps_per_deg
+        return abs(self._feedback(until_s) - target) <= allowed
+
+    def _write_once(
+        self, register: int, values: tuple[int, ...], taken: Callable[[], bool], until_s: float
+    ) -> None:
+        """Write; after a lost answer find out whether it was taken, and if not write once more."""
+        for last in (False, True):
+            try:
+                return self._drive.write(register, values, until_s, self._refuse_stopped)
+            except Lost as lost:
+                log.warning("%s", lost)
+                if self._known_taken(taken, lost):
+                    return None
+                if last or time.monotonic() > until_s:
+                    raise
+        return None
+
+    def _known_taken(self, taken: Callable[[], bool], lost: DeviceError) -> bool:
+        try:
+            return taken()
+        except Lost as worse:
+            raise type(worse)(
+                f"{worse} (before: {lost}); whether the drive has taken its last command is not "
+                "known: it may move"
+            ) from worse
+
+    def _refuse_stopped(self) -> None:
+        if self._stopped:
+            raise Stopped(f"{self.name}: stopped before it began to move")
+
+    def _output(self, until_s: float) -> Output:
+        return output_of(self._drive.read(OUTPUT, OUTPUT_AND_ALARM_COUNT, until_s))
+
+    def _feedback(self, until_s: float) -> int:
+        return value_of(self._drive.read(FEEDBACK_POSITION, 2, until_s))

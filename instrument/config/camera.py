@@ -1,0 +1,113 @@
+"""The camera of a rig file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from instrument.config.section import Finite, Name, NotNegative, Positive, Section
+
+V4L2_EXPOSURE_STEP_S = 1e-4
+_FORMAT_BITS = {"GREY": 8, "YUYV": 8, "Y10": 10, "Y16": 16}
+
+
+class Camera(Section):
+    """The camera on the beam: picture, electrons, exposure."""
+
+    width_px: Annotated[int, Field(ge=16, le=16384)]
+    height_px: Annotated[int, Field(ge=16, le=16384)]
+    field_width_mm: Positive
+    axis_row_px: Finite
+    axis_column_px: Finite
+    roll_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+    bit_depth: Annotated[int, Field(ge=8, le=16)]
+    full_well_electrons: Positive
+    read_noise_electrons: NotNegative
+    dark_current_electrons_per_s: NotNegative
+    black_level_dn: NotNegative = 0.0
+    min_exposure_s: Positive
+    max_exposure_s: Positive
+    frame_overhead_s: NotNegative
+
+    def mistakes(self) -> Iterator[tuple[str, str]]:
+        """Exposures in order, the axis inside the picture, room above the black level."""
+        if self.min_exposure_s > self.max_exposure_s:
+            yield (
+                "min_exposure_s",
+                f"{self.min_exposure_s:g}; allowed: at most max_exposure_s {self.max_exposure_s:g}",
+            )
+        for key, size in (("axis_row_px", self.height_px), ("axis_column_px", self.width_px)):
+            value = getattr(self, key)
+            if not 0 <= value <= size - 1:
+                yield key, f"{value:g} lies outside the picture; allowed: 0 to {size - 1}"
+        if self.black_level_dn >= self.max_dn / 2:
+            yield (
+                "black_level_dn",
+                f"{self.black_level_dn:g}; allowed: less than half of full scale, {self.max_dn} DN",
+            )
+        least = 4 * self.read_noise_electrons / self.electrons_per_dn
+        if self.black_level_dn < least:
+            yield (
+                "black_level_dn",
+                f"{self.black_level_dn:g}; allowed: at least {least:.3g}, 4 times the read noise "
+                "in counts, or darks are cut off at 0",
+            )
+
+    @property
+    def max_dn(self) -> int:
+        """The largest count that a pixel can give."""
+        return int(2**self.bit_depth - 1)
+
+    @property
+    def electrons_per_dn(self) -> float:
+        """Conversion gain: the full well fills the counts above the black level."""
+        return self.full_well_electrons / (self.max_dn - self.black_level_dn)
+
+    @property
+    def exposure_step_s(self) -> float:
+        """Exposures are whole multiples of it; 0 where any exposure can be set."""
+        return 0.0
+
+
+class SimulatedCamera(Camera):
+    """A camera that is simulated as a whole, in simulated time."""
+
+    driver: Literal["simulated"]
+
+
+class V4l2Camera(Camera):
+    """A Video4Linux camera; `device` is best a /dev/v4l/by-id path.
+
+    `gain` in the camera's own unit; where it is left out the camera must have none or keep its own.
+    `exposure_delay_frames`: frames after a change of exposure that may still have the old one.
+    `frames_per_s`: asked of the camera; left out, what it makes of 30 a second.
+    """
+
+    driver: Literal["v4l2"]
+    device: Name
+    pixel_format: Literal["GREY", "Y10", "Y16", "YUYV"]
+    gain: int | None = None
+    exposure_delay_frames: Annotated[int, Field(ge=0, le=20)] = 2
+    frames_per_s: Annotated[int, Field(ge=1, le=1000)] | None = None
+
+    @property
+    def exposure_step_s(self) -> float:
+        """V4L2's unit of exposure: 100 microseconds."""
+        return V4L2_EXPOSURE_STEP_S
+
+    def mistakes(self) -> Iterator[tuple[str, str]]:
+        """Whole steps of exposure; a format that carries the bits."""
+        yield from super().mistakes()
+        for key in ("min_exposure_s", "max_exposure_s"):
+            steps = getattr(self, key) / V4L2_EXPOSURE_STEP_S
+            if not 0.5 < steps < 1e15 or abs(steps - round(steps)) > 1e-6:
+                yield key, f"{getattr(self, key):g}; allowed: whole multiples of 0.0001 s"
+        most = _FORMAT_BITS[self.pixel_format]
+        if self.bit_depth > most or (most < 16 and self.bit_depth != most):
+            allowed = f"{most}" if most < 16 else "9 to 16"
+            yield "bit_depth", f"{self.bit_depth}; allowed for {self.pixel_format}: {allowed}"
+
+
+AnyCamera = Annotated[SimulatedCamera | V4l2Camera, Field(discriminator="driver")]

@@ -1,0 +1,123 @@
+"""An SMC100 as bytes: states, errors and answers as the maker's manual has them, over a motor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from sim.emulated.motor import Motor
+
+_NOT_REFERENCED, _HOMING, _MOVING, _READY_HOMED, _READY_MOVED = "0A", "1E", "28", "32", "33"
+_DISABLED = "3C"
+_ALL_AXES = ""
+
+
+class NewportController:
+    """One controller at an address. `motor.alarm` holds TS's four error digits."""
+
+    def __init__(self, motor: Motor, address: int = 1, model: str = "SMC100") -> None:
+        self.motor, self.address = motor, address
+        self._version = f" {model}_CC_Controller-driver version  2.0.0"
+        self._stage = "URS100CC_SIM0001"
+        self._buffer = b""
+        self._error = "@"
+        self._moved = False
+        self.values = {
+            "SL": motor.mechanics.min_deg,
+            "SR": motor.mechanics.max_deg,
+            "VA": motor.mechanics.speed_deg_per_s,
+            "AC": motor.mechanics.acceleration_deg_per_s2,
+        }
+        self.moves = 0
+
+    def answer(self, data: bytes) -> bytes:
+        """Answers to the whole lines among what has come so far."""
+        *lines, self._buffer = (self._buffer + data).split(b"\n")
+        return b"".join(self._line(line.strip().decode("ascii", "replace")) for line in lines)
+
+    def _line(self, line: str) -> bytes:
+        digits = line[: len(line) - len(line.lstrip("0123456789"))]
+        letters, value = line[len(digits) : len(digits) + 2], line[len(digits) + 2 :]
+        if digits not in (str(self.address), _ALL_AXES):
+            return b""  # another controller's
+        said = self._said(letters, value)
+        return b"" if said is None else f"{self.address}{letters}{said}\r\n".encode("ascii")
+
+    def _said(self, letters: str, value: str) -> str | None:
+        """What a command makes it say; None for silence."""
+        queries: dict[str, Callable[[], str]] = {
+            "TS": lambda: self._errors() + self._state(),
+            "TP": lambda: f"{self.motor.position_deg:.6f}",
+            "TE": self._told_error,
+            "VE": lambda: self._version,
+            "ID": lambda: self._stage,
+        }
+        if letters in queries:
+            return queries[letters]()
+        if letters in self.values and value == "?":
+            return f"{self.values[letters]:g}"
+        self._act(letters, value)
+        return None
+
+    def _act(self, letters: str, value: str) -> None:
+        if letters == "PA":
+            self._error = self._move(value)
+        elif letters == "OR":
+            self._error = self._home()
+        elif letters == "ST":
+            self.motor.stop()
+        elif letters in ("VA", "AC"):
+            self._error = self._set(letters, value)
+        else:
+            self._error = "A"
+
+    def _home(self) -> str:
+        if self._state() != _NOT_REFERENCED:
+            return "K"
+        self.motor.home()
+        return "@"
+
+    def _move(self, value: str) -> str:
+        state, target = self._state(), _number(value)
+        refused = {_NOT_REFERENCED: "H", _HOMING: "L", _MOVING: "M", _DISABLED: "J"}
+        if state in refused:
+            return refused[state]
+        if target is None:
+            return "C"
+        if not self.values["SL"] <= target <= self.values["SR"]:
+            return "N"
+        self.moves += 1
+        self._moved = True
+        self.motor.move(target)
+        return "@"
+
+    def _set(self, letters: str, value: str) -> str:
+        number = _number(value)
+        if number is None or number <= 0:
+            return "C"
+        self.values[letters] = number
+        return "@"
+
+    def _told_error(self) -> str:
+        error, self._error = self._error, "@"
+        return error
+
+    def _errors(self) -> str:
+        return self.motor.alarm or "0000"
+
+    def _state(self) -> str:
+        if self.motor.homing:
+            return _HOMING
+        if self.motor.alarm and self.motor.referenced:
+            return _DISABLED
+        if not self.motor.referenced:
+            return _NOT_REFERENCED
+        if self.motor.moving:
+            return _MOVING
+        return _READY_MOVED if self._moved else _READY_HOMED
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None

@@ -1,0 +1,1 @@
+"""sim/emulated/v4l2."""

@@ -1,0 +1,45 @@
+"""The library that lets OpenCV open an emulated camera: compiled where it is needed.
+
+A process uses it when it is started with `environment(...)`: the loader reads LD_PRELOAD at the
+start only. The device model (`sim.emulated.v4l2.server`) may run in that process or in another one.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+from instrument.errors import DeviceError
+
+_SOURCE = Path(__file__).with_name("shim.c")
+_OPTIONS = ("-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC")
+
+
+def compiled(folder: Path) -> Path:
+    """Compile the library into `folder` and return its path."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        raise DeviceError(
+            "emulated camera: no C compiler: `cc` is not on the PATH; install one "
+            "(Debian: gcc and libc6-dev), or use the simulated camera, which needs none"
+        )
+    library = folder / "gonio_v4l2_shim.so"
+    command = [compiler, *_OPTIONS, "-o", str(library), str(_SOURCE), "-ldl", "-lpthread"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise DeviceError(
+            f"emulated camera: {compiler} could not compile {_SOURCE.name}:\n{done.stderr.strip()}"
+        )
+    return library
+
+
+def environment(shim: Path, device: str, socket: Path) -> dict[str, str]:
+    """What to add to a process's environment so that `device` is the model behind `socket`."""
+    before = os.environ.get("LD_PRELOAD", "")
+    return {
+        "LD_PRELOAD": f"{shim} {before}".strip(),
+        "GONIO_V4L2_DEVICE": device,
+        "GONIO_V4L2_SOCKET": str(socket),
+    }

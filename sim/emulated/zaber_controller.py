@@ -1,0 +1,121 @@
+"""A Zaber rotary stage as bytes: replies, checksums and warnings over a motor."""
+
+from __future__ import annotations
+
+import re
+
+from sim.emulated.motor import Motor
+
+MICROSTEPS_PER_DEG = 1_536_000 / 360  # X-RSW60
+_SPEED_PER_MICROSTEP = 1.6384
+_COMMAND = re.compile(r"/(\d+)?(?: (\d+))?(?: (\d\d))?(?: ([a-z].*))?")
+
+
+class ZaberController:
+    """One device with one axis. `motor.alarm` holds a warning flag that begins with F."""
+
+    def __init__(
+        self, motor: Motor, device: int = 1, microsteps_per_deg: float = MICROSTEPS_PER_DEG
+    ) -> None:
+        self.motor, self.device, self._per_deg = motor, device, microsteps_per_deg
+        self._buffer = b""
+        self.moves = 0
+        low, high = motor.mechanics.min_deg, motor.mechanics.max_deg
+        speed = motor.mechanics.speed_deg_per_s * self._per_deg * _SPEED_PER_MICROSTEP
+        self.settings: dict[str, int | str] = {
+            "deviceid": 59999,  # no real device's
+            "system.serial": 75001,
+            "system.axiscount": 1,
+            "system.access": 1,
+            "version": "7.33",
+            "version.build": 15000,
+            "comm.protocol": 2,
+            "comm.address": device,
+            "resolution": 64,
+            "peripheral.id": 0,
+            "limit.min": round(low * self._per_deg),
+            "limit.max": round(high * self._per_deg),
+            "maxspeed": round(speed),
+        }
+
+    def answer(self, data: bytes) -> bytes:
+        """Replies to the whole lines among what has come so far."""
+        *lines, self._buffer = (self._buffer + data).split(b"\n")
+        return b"".join(self._line(line.strip()) for line in lines)
+
+    def _line(self, line: bytes) -> bytes:
+        text, colon, check = line.decode("ascii", "replace").partition(":")
+        found = _COMMAND.fullmatch(text)
+        if found is None or (colon and int(check or "0", 16) != _check(text[1:])):
+            return b""  # a wrong checksum is not answered
+        device, axis, number, words = found.groups()
+        if device not in (None, "0", "00", str(self.device), f"{self.device:02d}"):
+            return b""
+        flag, data = self._said((words or "").strip())
+        return self._reply(axis or "0", number, flag, data)
+
+    def _reply(self, axis: str, number: str | None, flag: str, data: str) -> bytes:
+        """State as it is after the command: a move may have ended since its position was read."""
+        status = "BUSY" if self.motor.moving else "IDLE"
+        head = f"{self.device:02d} {axis}" + (f" {number}" if number else "")
+        body = f"{head} {flag} {status} {(self._warnings() or ['--'])[0]} {data}"
+        return f"@{body}:{_check(body):02X}\r\n".encode("ascii")
+
+    def _said(self, words: str) -> tuple[str, str]:
+        """OK or RJ, and the reply's data."""
+        command, _, rest = words.partition(" ")
+        if command == "":
+            return "OK", "0"
+        if command == "stop":
+            self.motor.stop()
+            return "OK", "0"
+        if command == "warnings":
+            flags = self._warnings()
+            return "OK", " ".join([f"{len(flags):02d}", *flags])
+        actions = {"get": self._get, "set": self._set, "move": self._move, "home": self._home}
+        return actions[command](rest) if command in actions else ("RJ", "BADCOMMAND")
+
+    def _get(self, setting: str) -> tuple[str, str]:
+        if setting in ("pos", "encoder.pos"):
+            return "OK", str(round(self.motor.position_deg * self._per_deg))
+        if setting not in self.settings:
+            return "RJ", "BADCOMMAND"
+        return "OK", str(self.settings[setting])
+
+    def _set(self, rest: str) -> tuple[str, str]:
+        setting, _, value = rest.partition(" ")
+        if setting != "maxspeed":
+            return "RJ", "BADCOMMAND"
+        if not value.isdigit() or int(value) == 0:
+            return "RJ", "BADDATA"
+        self.settings[setting] = int(value)
+        return "OK", "0"
+
+    def _move(self, rest: str) -> tuple[str, str]:
+        kind, _, value = rest.partition(" ")
+        if kind != "abs" or not value.lstrip("-").isdigit():
+            return "RJ", "BADDATA"
+        if not self.motor.referenced:
+            return "RJ", "BADCOMMAND"
+        if self.motor.alarm:
+            return "RJ", "DRIVERDISABLED"
+        low, high = int(self.settings["limit.min"]), int(self.settings["limit.max"])
+        if not low <= int(value) <= high:
+            return "RJ", "BADDATA"
+        self.moves += 1
+        self.motor.move(int(value) / self._per_deg)
+        return "OK", "0"
+
+    def _home(self, _: str) -> tuple[str, str]:
+        if self.motor.alarm:
+            return "RJ", "DRIVERDISABLED"
+        self.motor.home()
+        return "OK", "0"
+
+    def _warnings(self) -> list[str]:
+        flags = [self.motor.alarm] if self.motor.alarm else []
+        return flags if self.motor.referenced else [*flags, "WH"]
+
+
+def _check(body: str) -> int:
+    return -sum(body.encode("ascii", "replace")) & 0xFF

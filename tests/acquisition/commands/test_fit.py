@@ -1,0 +1,202 @@
+"""`gonio fit`: what it reads, what it prints, and how it ends."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.models import MODELS
+from instrument.geometry import Geometry
+from tests.support.command import gonio_here as gonio
+from tests.support.paths import ROOT
+from tests.support.scans import small_demo
+
+CURET = ROOT.parent / "shared" / "data" / "curet"
+VIEWS = np.arange(-70.0, 71.0, 10.0)
+HEADER = "theta_i_deg,theta_r_deg,dphi_deg,brdf,u_brdf\n"
+
+
+def table(path: Path, name: str, incidences: tuple[float, ...], **truth: float) -> Path:
+    """A CSV of one model with noise of half a per cent."""
+    theta_i, theta_r = (a.ravel() for a in np.meshgrid(incidences, VIEWS, indexing="ij"))
+    f = MODELS[name].brdf(Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r), **truth)
+    f = f * (1 + 0.005 * np.random.default_rng(4).standard_normal(f.size))
+    rows = zip(theta_i, theta_r, f, strict=True)
+    path.write_text(HEADER + "".join(f"{i},{r},0,{v},{0.005 * v}\n" for i, r, v in rows))
+    return path
+
+
+@pytest.fixture(scope="module")
+def rough(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("csv") / "rough.csv"
+    return table(path, "oren_nayar", (30.0, 45.0, 60.0), albedo=0.8, sigma_deg=30.0)
+
+
+def test_json_alone_is_on_standard_output(rough: Path) -> None:
+    done = gonio("fit", rough, "--json")
+    assert done.returncode == 0, done.stderr
+    fit = json.loads(done.stdout)
+    assert (fit["chosen"], fit["verdict"]) == ("oren_nayar", "adequate")
+    assert fit["symmetry"]["says"] == "rough"
+    sigma = next(c for c in fit["candidates"] if c["model"] == "oren_nayar")["parameters"][
+        "sigma_deg"
+    ]
+    assert abs(sigma["value"] - 30) < 4 * sigma["u"]
+
+
+def test_a_person_reads_parameters_candidates_and_why(rough: Path) -> None:
+    done = gonio("fit", rough, "--models", "lambert,oren_nayar")
+    assert done.returncode == 0, done.stderr
+    for words in ("oren_nayar: the simplest model", "sigma_deg", "±", "ΔBIC", "ΔAICc", "symmetry"):
+        assert words in done.stdout
+    assert "wolff" not in done.stdout
+
+
+def test_the_rough_surface_is_worked_out_as_asked(rough: Path) -> None:
+    done = gonio("fit", rough, "--method", "qualitative", "--json")
+    names = {c["model"] for c in json.loads(done.stdout)["candidates"]}
+    assert "oren_nayar_qualitative" in names
+    assert not names & {"oren_nayar", "oren_nayar_exact"}
+
+
+def test_where_the_model_does_not_hold_is_told(tmp_path: Path) -> None:
+    truth = {"albedo": 0.3, "sigma_deg": 20.0}
+    oblique = table(tmp_path / "oblique.csv", "oren_nayar", (45.0, 86.0), **truth)
+    done = gonio("fit", oblique, "--models", "oren_nayar")
+    assert re.search(r"at \d+ of \d+ points the model is beyond what it holds for", done.stdout)
+
+
+def test_none_adequate_is_a_result(rough: Path) -> None:
+    done = gonio("fit", rough, "--models", "lambert", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["verdict"] == "none adequate"
+
+
+def test_what_the_data_do_not_determine_ends_with_5_and_its_json(tmp_path: Path) -> None:
+    normal = table(tmp_path / "normal.csv", "oren_nayar", (0.0,), albedo=0.8, sigma_deg=30.0)
+    done = gonio("fit", normal, "--models", "oren_nayar", "--json")
+    assert done.returncode == 5
+    fit = json.loads(done.stdout)
+    assert fit["verdict"] == "not identifiable"
+    parameters = fit["candidates"][0]["parameters"]
+    assert parameters["sigma_deg"]["u"] is None
+    low, high = parameters["sigma_deg"]["interval"]
+    assert low <= 30 <= high
+    assert "the data do not determine" in done.stderr
+
+
+def test_too_few_points_for_any_fit_end_with_5_and_their_json(tmp_path: Path) -> None:
+    path = tmp_path / "one.csv"
+    path.write_text(HEADER + "30,0,0,0.2,0.001\n")
+    done = gonio("fit", path, "--models", "oren_nayar", "--json")
+    assert done.returncode == 5
+    assert json.loads(done.stdout)["chosen"] is None
+    assert "1 points are too few" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (HEADER + "30,0,0,zero,0.001\n", ":2:8: brdf: 'zero' is text"),
+        (HEADER + "30,0,0,0.2,-1\n", ":2:12: u_brdf: -1 1/sr; allowed: 1e-15 to 1e15 1/sr"),
+        (HEADER + "95,0,0,0.2,0.1\n", ":2:1: theta_i_deg: 95 deg; allowed: a number from 0 to 90"),
+        (HEADER + "30,0,0,nan,0.1\n", ":2:8: brdf: 'nan' is not finite"),
+        (HEADER + 2 * "30,0,0,0.2,0.1\n", ":3:1: theta_i_deg: the same three angles"),
+        ("theta_i_deg,theta_r_deg,brdf\n30,0,0.2\n", ":1:1: dphi_deg: the column is missing"),
+        ("", ":1:1: the file is empty"),
+    ],
+)
+def test_mistakes_in_a_table_end_with_2_and_their_place(
+    text: str, words: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "wrong.csv"
+    path.write_text(text)
+    done = gonio("fit", path, "--json")
+    assert done.returncode == 2
+    assert f"{path}{words}" in done.stderr
+    assert done.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--models", "phong,lambert"), "--models: unknown model 'phong'"),
+        (("--models", "lambert,lambert"), "stands twice"),
+        (("--max-theta-deg", "0"), "--max-theta-deg: 0 degrees; allowed: above 0, up to 90"),
+        (("--max-theta-deg", "nan"), "--max-theta-deg: nan degrees"),
+        (("--format", "xml"), "--format: xml; allowed: auto, run, csv, curet"),
+        (("--sample", "3"), "--sample: 3 for the format csv"),
+        (("--method", "cubic"), "--method: cubic; allowed: auto, qualitative, functional, exact"),
+        (("--method", "exact", "--models", "lambert"), "--method: exact; allowed: auto, as"),
+    ],
+)
+def test_wrong_options_are_named(rough: Path, options: tuple[str, ...], words: str) -> None:
+    done = gonio("fit", rough, *options)
+    assert done.returncode == 2
+    assert words in done.stderr
+
+
+def test_angles_can_be_cut(rough: Path) -> None:
+    done = gonio("fit", rough, "--max-theta-deg", "45")
+    assert done.returncode == 0, done.stderr
+    assert "points lie beyond 45 degrees" in done.stdout
+
+
+def test_outliers_are_named_on_request(rough: Path, tmp_path: Path) -> None:
+    lines = rough.read_text().splitlines()
+    fields = lines[8].split(",")
+    lines[8] = ",".join([*fields[:3], str(1.5 * float(fields[3])), fields[4]])
+    path = tmp_path / "outlier.csv"
+    path.write_text("\n".join(lines))
+    candidates = ("--models", "lambert,oren_nayar_qualitative,oren_nayar")
+    assert "none explains" in gonio("fit", path, *candidates).stdout
+    done = gonio("fit", path, *candidates, "--robust")
+    assert done.returncode == 0, done.stderr
+    assert "oren_nayar: the simplest model" in done.stdout
+    assert "1 outliers set aside" in done.stdout
+    assert f"set aside: theta_i 30, theta_r {float(fields[1]):g}" in done.stdout
+
+
+def test_relative_values_give_the_roughness_and_no_albedo(rough: Path, tmp_path: Path) -> None:
+    rows = [line.split(",") for line in rough.read_text().splitlines()[1:]]
+    scaled = [f"{i},{r},{p},{37 * float(f)},{37 * float(u)}\n" for i, r, p, f, u in rows]
+    path = tmp_path / "relative.csv"
+    path.write_text(HEADER + "".join(scaled))
+    candidates = ("--models", "lambert,oren_nayar_qualitative,oren_nayar")
+    done = gonio("fit", path, *candidates, "--relative", "--json")
+    assert done.returncode == 5
+    fit = json.loads(done.stdout)
+    found = next(c for c in fit["candidates"] if c["model"] == fit["chosen"])["parameters"]
+    assert abs(found["sigma_deg"]["value"] - 30) < 4 * found["sigma_deg"]["u"]
+    assert found["albedo"]["u"] is None
+    assert found["per_brdf"]["u"] is None
+
+
+def test_a_run_is_fitted_as_it_was_at_its_end(tmp_path: Path) -> None:
+    done = gonio("run", small_demo(tmp_path), "--out", tmp_path / "run", "--json")
+    again = gonio("fit", tmp_path / "run", "--json")
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout) == json.loads(done.stdout)
+    table_only = gonio("fit", tmp_path / "run" / "measurements.csv", "--json")
+    assert json.loads(table_only.stdout)["chosen"] == json.loads(done.stdout)["chosen"]
+
+
+def test_a_folder_that_is_no_run_says_what_to_name(tmp_path: Path) -> None:
+    done = gonio("fit", tmp_path)
+    assert done.returncode == 2
+    assert f"{tmp_path}: a folder without record.sqlite is no run" in done.stderr
+
+
+@pytest.mark.skipif(not CURET.is_dir(), reason="the CUReT tables are not beside the project")
+def test_a_material_of_the_curet_database() -> None:
+    options = ("--format", "curet", "--sample", "10", "--max-theta-deg", "68.8")
+    done = gonio("fit", CURET, *options, "--models", "lambert,oren_nayar")
+    assert done.returncode == 0, done.stderr
+    assert "116 of 116 directions up to 68.8 degrees" in done.stdout
+    assert "1.88 %" in done.stdout
+    assert "no u is stated: the noise is estimated from the residuals" in done.stdout
+    assert gonio("fit", CURET).returncode == 2

@@ -1,0 +1,232 @@
+"""`gonio home`, `move`, `grab`, `devices`; and the operator at the terminal."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import pty
+import re
+import select
+import sys
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from acquisition.terminal.operator import TerminalOperator
+from drivers.manual import HandSetAxis
+from instrument.config.load import load_rig
+from instrument.devices import Request
+from instrument.errors import InputError, OperatorStop
+from tests.support.command import gonio_here as gonio
+from tests.support.paths import CONFIGS, ROOT
+
+BENCH, PAPER = CONFIGS / "rigs" / "bench_12bit.yaml", CONFIGS / "rigs" / "paper_1995.yaml"
+
+
+def test_an_axis_is_homed_and_moved() -> None:
+    done = gonio("home", "theta_r", "--rig", BENCH)
+    assert (done.returncode, done.stdout.strip()) == (0, "theta_r: stands at 0.0000 deg")
+    done = gonio("move", "theta_r", "-20.5", "--rig", BENCH)
+    assert (done.returncode, done.stdout.strip()) == (0, "theta_r: stands at -20.5000 deg")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("move", "theta_r", "88.5", "--rig", BENCH), "88.5 deg; allowed by .*: -88 to 88 deg"),
+        (("move", "theta_r", "nan", "--rig", BENCH), "nan deg; allowed by"),
+        (("move", "phi", "1", "--rig", BENCH), "'phi' is no axis; allowed: theta_i, dphi, theta_r"),
+        (("home", "theta_i", "--rig", PAPER), "theta_i is set by hand on the rig paper_1995"),
+        (("home", "theta_r"), "name the rig file: --rig FILE"),
+        (("grab", "--rig", BENCH, "-o", "x.jpg"), r"x.jpg: --out must end in .png .* or .tiff"),
+        (("move", "theta_r", "1", "--rig", "nowhere.yaml"), "nowhere.yaml"),
+    ],
+)
+def test_mistakes_are_named_and_nothing_moves(arguments: tuple[object, ...], words: str) -> None:
+    done = gonio(*arguments)
+    assert done.returncode == 2
+    assert re.search(words, done.stderr)
+    assert "Traceback" not in done.stderr
+
+
+def test_a_frame_for_aiming(tmp_path: Path) -> None:
+    common = ("grab", "--rig", BENCH, "--exposure-s", "0.03", "--theta-r-deg", "50")
+    done = gonio(*common, "-o", tmp_path / "aim.png", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    drawn = cv2.imread(str(tmp_path / "aim.png"))
+    assert drawn.shape == (512, 640, 3)
+    coloured = np.any(drawn != drawn[..., :1], axis=2)
+    assert 200 < coloured.sum() < 5000  # the window's outline and the axis
+    gonio(*common, "-o", tmp_path / "aim.tiff")
+    raw = cv2.imread(str(tmp_path / "aim.tiff"), cv2.IMREAD_UNCHANGED)
+    assert raw.dtype == np.uint16
+    assert float(raw.mean()) == pytest.approx(found["frame_mean_dn"], rel=0.01)
+    assert found["window_max_dn"] <= found["frame_max_dn"] <= found["full_scale_dn"]
+
+
+# The operator.
+
+
+class Answers:
+    """An operator with the answers written down."""
+
+    def __init__(self, *answers: str) -> None:
+        self.answers, self.asked = list(answers), []
+
+    def ask(self, request: Request) -> str:
+        self.asked.append(request.text)
+        return self.answers.pop(0)
+
+
+@pytest.mark.parametrize(("answer", "angle_deg"), [("", 30.0), ("done", 30.0), ("30.2", 30.2),
+                                                   ("29,9", 29.9), ("30.1°", 30.1)])  # fmt: skip
+def test_what_the_operator_says_was_set_is_what_counts(answer: str, angle_deg: float) -> None:
+    axis = HandSetAxis("theta_i", "the lamp's angle", Answers(answer), tolerance_deg=0.75)
+    axis.start_move(30.0)
+    assert axis.wait() == axis.position_deg() == angle_deg
+
+
+def test_an_angle_that_is_off_is_asked_for_again() -> None:
+    operator = Answers("35", "thirty", "30.5")
+    axis = HandSetAxis("theta_i", "the lamp's angle", operator, tolerance_deg=0.75)
+    axis.start_move(30.0)
+    assert axis.wait() == 30.5
+    assert "'35' is not within 0.75 degrees of 30" in operator.asked[1]
+    assert "'thirty' is not within 0.75 degrees of 30" in operator.asked[2]
+
+
+@pytest.mark.parametrize(
+    ("typed", "answer"), [("\n", "done"), ("30.2\n", "30.2"), ("  29,9 \n", "29,9")]
+)
+def test_the_operator_answers_at_the_terminal(
+    monkeypatch: pytest.MonkeyPatch, typed: str, answer: str
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO(typed))
+    request = Request("set axis", "Set the lamp to 30 degrees", axis="theta_i", angle_deg=30.0)
+    assert TerminalOperator().ask(request) == answer
+
+
+@pytest.mark.parametrize(("typed", "says"), [("q\n", "stopped at the prompt: Put foam"),
+                                             ("", "nobody answers")])  # fmt: skip
+def test_the_operator_may_stop_or_be_gone(
+    monkeypatch: pytest.MonkeyPatch, typed: str, says: str
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO(typed))
+    with pytest.raises(OperatorStop, match=says):
+        TerminalOperator().ask(Request("place", "Put foam on the sample table"))
+
+
+REAL_RIG = """
+name: real
+beam_length_mm: 800.0
+lamp_distance_mm: 1000.0
+source_solid_angle_sr: 0.0005
+receiver_solid_angle_sr: 0.0003
+axes:
+  theta_i: {driver: hand, min_deg: 0.0, max_deg: 85.0, u_deg: 0.25}
+  dphi: {driver: hand, min_deg: 0.0, max_deg: 180.0, u_deg: 0.25}
+  theta_r: {driver: newport, port: /dev/nowhere, min_deg: -88.0, max_deg: 88.0, u_deg: 0.02,
+            speed_deg_per_s: 20.0, acceleration_deg_per_s2: 40.0, settle_s: 0.3}
+camera: {driver: v4l2, device: /dev/nocamera, pixel_format: GREY, bit_depth: 8, width_px: 640,
+         height_px: 480, field_width_mm: 72.0, axis_row_px: 240.0, axis_column_px: 320.0,
+         full_well_electrons: 10000.0, read_noise_electrons: 10.0,
+         dark_current_electrons_per_s: 20.0, black_level_dn: 8.0, min_exposure_s: 0.0001,
+         max_exposure_s: 0.5, frame_overhead_s: 0.03}
+lamp: {driver: manual, darkened_by: hand, white_electrons_per_s: 100000.0}
+"""
+
+
+@pytest.fixture
+def real_rig(tmp_path: Path) -> Path:
+    path = tmp_path / "real.yaml"
+    path.write_text(REAL_RIG)
+    return path
+
+
+def test_a_real_rig_without_a_terminal_is_not_even_opened(real_rig: Path, tmp_path: Path) -> None:
+    done = gonio("run", CONFIGS / "protocols" / "demo.yaml", "--rig", real_rig,
+                 "--out", tmp_path / "run")  # fmt: skip
+    assert done.returncode == 2
+    assert "standard input is no terminal" in done.stderr
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("theta_i", "words"),
+    [
+        ("{driver: newport, port: /dev/nowhere, ", "both at /dev/nowhere, address 1; allowed: an"),
+        ("{driver: zaber, port: /dev/nowhere, microsteps_per_deg: 100.0, ",
+         "both at /dev/nowhere, with zaber and newport; allowed on one port: one driver"),
+        ("{driver: newport, port: emulated, ", "axis theta_i is emulated, .*camera is real"),
+        ("{driver: simulated, ", "axis theta_i is simulated, .*axis theta_r is real"),
+    ],
+)  # fmt: skip
+def test_devices_that_do_not_go_together(real_rig: Path, theta_i: str, words: str) -> None:
+    motor = "speed_deg_per_s: 1.0, acceleration_deg_per_s2: 1.0, settle_s: 0.1, "
+    text = real_rig.read_text().replace("theta_i: {driver: hand, ", f"theta_i: {theta_i}{motor}")
+    real_rig.write_text(text)
+    with pytest.raises(InputError, match=words):
+        load_rig(real_rig)
+
+
+def test_a_missing_device_is_named_with_what_to_look_at(real_rig: Path) -> None:
+    done = gonio("home", "theta_r", "--rig", real_rig, "--yes")
+    assert done.returncode == 3
+    assert re.search(r"theta_r: cannot open /dev/nowhere: .*look at the cable", done.stderr)
+    done = gonio("devices", "--rig", real_rig)
+    assert done.returncode == 3
+    assert "theta_r: FAILED: theta_r: cannot open /dev/nowhere" in done.stdout
+    assert "camera: FAILED:" in done.stdout
+    assert "/dev/nocamera" in done.stdout
+
+
+def at_terminal(arguments: list[object], replies: dict[str, str], until: str) -> str:
+    """Run `gonio` on a pseudo-terminal, answering prompts; what it printed up to its end."""
+    pid, master = pty.fork()
+    if pid == 0:
+        os.chdir(ROOT)
+        os.execv(sys.executable, [sys.executable, "-m", "acquisition", *map(str, arguments)])
+    text, end_s, waiting = "", time.monotonic() + 30, dict(replies)
+    while time.monotonic() < end_s:
+        if not select.select([master], [], [], 0.5)[0]:
+            continue
+        try:
+            text += os.read(master, 4096).decode("utf-8", "replace")
+        except OSError:
+            break
+        for prompt in [p for p in waiting if p in text]:
+            os.write(master, waiting.pop(prompt).encode())
+    os.close(master)  # hangs up on a child that still waits for an answer
+    os.waitpid(pid, 0)
+    assert until in text, text
+    return text
+
+
+def test_nothing_real_moves_before_somebody_has_said_so(real_rig: Path) -> None:
+    from tests.support.stages.emulated_benches import newport
+
+    with newport() as bench:
+        text = real_rig.read_text().replace("/dev/nowhere", str(bench.wire.port))
+        real_rig.write_text(text)
+        bench.stage.close()
+        said = at_terminal(["home", "theta_r", "--rig", real_rig], {"[y/N]": "n\n"}, "moved")
+        assert "SMC100" in said
+        assert not bench.motor.referenced
+        at_terminal(["home", "theta_r", "--rig", real_rig], {"[y/N]": "y\n"}, "stands at 0.0000")
+        assert bench.motor.referenced
+
+
+@pytest.mark.parametrize("exposure", ["0", "-1", "9", "nan"])
+def test_an_exposure_that_the_camera_does_not_have_is_refused(
+    exposure: str, tmp_path: Path
+) -> None:
+    out = tmp_path / "frame.tiff"
+    done = gonio("grab", "--rig", BENCH, f"--exposure-s={exposure}", "-o", out)
+    assert done.returncode == 2
+    assert "the camera can do 0.0005 to 2 s" in done.stderr
+    assert not out.exists()

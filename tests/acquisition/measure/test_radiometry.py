@@ -1,0 +1,127 @@
+"""Window means, their uncertainty and their flags, on frames whose truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.special import ndtr
+
+from acquisition.measure.radiometry import Dark, dark_of, measure, rounding_u_dn
+from acquisition.measure.window import Window, window_at
+from instrument.config.load import load_rig
+from instrument.devices import Frame
+from instrument.pinhole import Pinhole
+from tests.support.paths import CONFIGS
+
+RIG = load_rig(CONFIGS / "rigs" / "bench_12bit.yaml")
+CAMERA = RIG.camera
+SHAPE = (CAMERA.height_px, CAMERA.width_px)
+
+
+def _window(theta_r: float = 0.0, size: float = 20.0) -> Window:
+    return window_at(theta_r, Pinhole.of(RIG), size, size)
+
+
+def _frames(mean: float, sd: float, count: int, seed: int = 1) -> list[Frame]:
+    random = np.random.default_rng(seed)
+    return [
+        Frame(np.rint(random.normal(mean, sd, SHAPE)).astype(np.uint16), 0.01, 0.0)
+        for _ in range(count)
+    ]
+
+
+@cache
+def _dark() -> Dark:
+    return dark_of(_frames(64.0, 1.1, 8, seed=2), CAMERA)
+
+
+def test_the_dark_is_subtracted_and_cos4_divided_out() -> None:
+    flat = [Frame(np.full(SHAPE, 1064, np.uint16), 0.01, 0.0)] * 2
+    no_noise = Dark(0.01, np.full(SHAPE, 64.0), np.zeros(SHAPE), 8)
+    rows, columns = np.ogrid[_window().crop]
+    falloff = Pinhole.of(RIG).cos4(columns, rows)
+    expected = 1000 * np.sum(_window().weights * falloff / falloff)
+    signal = measure(flat, no_noise, _window(), CAMERA, 0.0, 100)
+    assert signal.signal_dn == pytest.approx(expected)
+    assert signal.signal_dn == pytest.approx(1000, rel=1e-3)  # cos^4 is within 1e-3 of 1 here
+
+
+def test_the_stated_noise_is_the_spread_of_repeated_measurements() -> None:
+    window = _window(75.0, 4.0)  # few pixels, so that the noise shows
+    series = [
+        measure(_frames(1500, 20, 4, seed), _dark(), window, CAMERA, 0.0, 1) for seed in range(60)
+    ]
+    spread = np.std([s.signal_dn for s in series], ddof=1)
+    # 59 degrees of freedom: the spread is known to 9 %.
+    assert np.mean([s.u_noise_dn for s in series]) == pytest.approx(spread, rel=0.3)
+
+
+def test_a_single_frame_takes_its_noise_from_the_photon_transfer_curve() -> None:
+    gain = CAMERA.electrons_per_dn
+    electrons = (1500 - CAMERA.black_level_dn) * gain
+    sd = np.sqrt(electrons + CAMERA.read_noise_electrons**2) / gain
+    one = measure(_frames(1500, sd, 1), _dark(), _window(), CAMERA, 0.0, 100)
+    many = measure(_frames(1500, sd, 16), _dark(), _window(), CAMERA, 0.0, 100)
+    assert one.u_noise_dn == pytest.approx(4 * many.u_noise_dn, rel=0.1)
+
+
+@pytest.mark.parametrize("sd", [0.0, 0.1, 0.2, 0.3, 0.5])
+def test_rounding_leaves_what_the_fourier_series_says(sd: float) -> None:
+    """Against the mean of rounded normal noise itself, worked out with its distribution."""
+    levels = np.arange(0.0005, 1, 0.001)
+    counts = np.arange(-9, 11)
+    edges = (np.append(counts - 0.5, counts[-1] + 0.5) - levels[:, None]) / max(sd, 1e-9)
+    mean = np.diff(ndtr(edges), axis=1) @ counts
+    error = mean - levels
+    assert rounding_u_dn(sd**2) == pytest.approx(np.sqrt(np.mean(error**2)), abs=2e-4)
+
+
+def test_without_noise_rounding_is_a_uniform_error() -> None:
+    assert rounding_u_dn(0.0) == pytest.approx(1 / np.sqrt(12), rel=2e-3)
+
+
+@given(st.floats(0, 1), st.floats(0, 1))
+def test_more_noise_means_less_rounding_error(a: float, b: float) -> None:
+    low, high = sorted((a, b))
+    assert rounding_u_dn(high) <= rounding_u_dn(low)
+
+
+def test_a_misplaced_sample_counts_by_the_slope_of_the_picture() -> None:
+    """A picture that brightens along its rows, seen from the side, by a sample 1 mm too near."""
+    window, camera = _window(60.0), Pinhole.of(RIG)
+    ramp = np.broadcast_to(1000 + 2 * np.arange(SHAPE[1]), SHAPE).astype(np.uint16)
+    dark = Dark(0.01, np.full(SHAPE, 64.0), np.zeros(SHAPE), 8)
+    signal = measure([Frame(ramp, 0.01, 0.0)] * 2, dark, window, CAMERA, 1.0, 100)
+    near, on_axis = (camera.project([0.0, 0.0], 60.0, h)[0] for h in (1.0, 0.0))
+    # The surface has moved to the left, so the window sees what belongs further right.
+    assert signal.u_placement_dn == pytest.approx(2 * (on_axis - near), rel=0.01)
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 45.0, 90.0, -120.0])
+def test_the_shift_of_a_misplaced_sample_turns_with_the_camera(roll_deg: float) -> None:
+    camera = replace(Pinhole.of(RIG), roll_deg=roll_deg)
+    columns, rows = window_at(60.0, camera, 20.0, 20.0).shift_px_per_mm
+    # 640 pixels for 72 mm, seen at sin 60; against the columns at no roll.
+    shift = 640 / 72 * np.sin(np.radians(60.0))
+    assert np.hypot(columns, rows) == pytest.approx(shift, rel=2e-3)
+    assert np.degrees(np.arctan2(-rows, -columns)) == pytest.approx(roll_deg, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("level", "size", "theta_r", "flag"),
+    [
+        (4095, 20.0, 0.0, "saturated"),
+        (1500, 0.5, 80.0, "too few pixels"),
+        (1500, 90.0, 0.0, "window leaves frame"),
+        (1500, 20.0, 0.0, ""),
+    ],
+)
+def test_what_is_wrong_is_flagged(level: int, size: float, theta_r: float, flag: str) -> None:
+    frames = [Frame(np.full(SHAPE, level, np.uint16), 0.01, 0.0)] * 2
+    signal = measure(frames, _dark(), _window(theta_r, size), CAMERA, 0.0, 100)
+    assert signal.flags == flag

@@ -1,0 +1,236 @@
+"""The cheapest adequate method: it keeps the tolerance, and nothing cheaper would have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+import pytest
+
+from analysis.accuracy.cheapest import CHECKS, PHYSICS, Adequate, cheapest
+from analysis.accuracy.method import Method, Physics, Ranges
+from analysis.models.rough.form_error import LIMIT_DEG
+from analysis.models.rough.oren_nayar_exact import FINE, forget, oren_nayar_exact_brdf
+from instrument.geometry import Geometry
+from tests.analysis.accuracy.test_method import angles, drawn_ranges, within
+from tests.support.cpu_time import cpu_seconds
+
+Random = np.random.Generator
+
+POINT = {"albedo": (0.8, 0.8), "sigma_deg": (20.0, 20.0)}
+# A method that costs more than this many times another is dearer.
+DEARER = 1.2
+
+
+def scene(random: Random, physics: Physics) -> tuple[Geometry, Ranges, float, int]:
+    """Up to CHECKS geometries, ranges, a tolerance and the number of uses, all at random."""
+    count = int(np.exp(random.uniform(0, np.log(CHECKS))))
+    limit_deg = random.uniform(20, LIMIT_DEG)
+    geometry = angles(random, count, limit_deg)
+    if random.random() < 0.3:
+        theta_r = np.linspace(-limit_deg, limit_deg, count)
+        geometry = Geometry.from_degrees(theta_i=random.uniform(0, limit_deg), theta_r=theta_r)
+    least = 1e-7 if physics.name == "rough" else 1e-6
+    tolerance = float(np.exp(random.uniform(np.log(least), np.log(0.5))))
+    return geometry, drawn_ranges(random, physics), tolerance, int(random.choice([1, 10, 100]))
+
+
+def off(physics: Physics, method: Method, geometry: Geometry, values: dict[str, float]) -> float:
+    exact = physics.reference.kernel(geometry, **values)
+    return float(np.max(np.abs(physics.off(method.kernel(geometry, **values), exact))))
+
+
+def steps(ranges: Ranges, count: int) -> Iterator[dict[str, float]]:
+    """The corners of the ranges, then `count` evenly spaced values of each together."""
+    names, ends = list(ranges), [sorted(set(r)) for r in ranges.values()]
+    lines = [np.linspace(low, high, count if low < high else 1) for low, high in ranges.values()]
+    for each in (*product(*ends), *product(*lines)):
+        values = dict(zip(names, map(float, each), strict=True))
+        yield {n: max(v, 1e-9) if n == "albedo" else v for n, v in values.items()}
+
+
+def breaks(
+    physics: Physics, method: Method, geometry: Geometry, ranges: Ranges, tolerance: float
+) -> bool:
+    """Whether a method is off by more than the tolerance anywhere in the ranges.
+
+    As far as the reference can tell: a method is not given the benefit of the reference's error.
+    """
+    tolerance -= 2 * float(np.max(physics.accuracy(geometry)))
+    count = 65 if sum(low < high for low, high in ranges.values()) == 1 else 33
+    if physics.name == "rough":  # the albedo counts by its ends, the highest sigma first
+        albedos = sorted(set(ranges["albedo"]))
+        sigmas = np.linspace(*reversed(ranges["sigma_deg"]), 129)
+        tried: Iterator[dict[str, float]] = (
+            {"albedo": max(a, 1e-9), "sigma_deg": float(s)} for s in sigmas for a in albedos
+        )
+    else:
+        tried = steps({**ranges, **_top(ranges)}, count)
+    return any(off(physics, method, geometry, values) > tolerance for values in tried)
+
+
+def _top(ranges: Ranges) -> Ranges:
+    """A lobe's scale counts by its upper end."""
+    return {"scale": (ranges["scale"][1],) * 2} if "scale" in ranges else {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "share"), [("rough", 0.5), ("smooth", 0.1), ("lobe", 0.4)])
+def test_random_scenes_keep_the_tolerance_at_the_least_cost(
+    name: str, share: float, slow: bool
+) -> None:
+    """A thousand in the long form: everywhere within, and every method that is cheaper is not."""
+    physics, random = PHYSICS[name], np.random.default_rng(20)
+    for _ in range(round(share * (1000 if slow else 24))):
+        geometry, ranges, tolerance, uses = scene(random, physics)
+        found = cheapest(name, geometry, ranges, tolerance, uses=uses)
+        for _ in range(6):
+            values = within(random, ranges)
+            assert off(physics, physics[found.method], geometry, values) <= tolerance, (
+                found, ranges, values,
+            )  # fmt: skip
+        size = geometry.theta_i_deg.size
+        for method in physics.methods:
+            cost = method.cost(geometry, ranges).of(size, uses)
+            if found.cost > DEARER * cost:
+                assert breaks(physics, method, geometry, ranges, tolerance), (
+                    found, method.name, tolerance, ranges,
+                )  # fmt: skip
+        forget()
+
+
+def test_larger_scenes_keep_the_tolerance_too() -> None:
+    """There a doubt may be too large to check: nearly always the bounds settle it."""
+    physics, random, dearer = PHYSICS["rough"], np.random.default_rng(3), 0
+    for _ in range(3):
+        geometry, ranges = angles(random, 2 * CHECKS), drawn_ranges(random, physics)
+        tolerance = float(np.exp(random.uniform(np.log(1e-4), np.log(0.3))))
+        found = cheapest("rough", geometry, ranges, tolerance)
+        values = within(random, ranges)
+        each = {m.name: off(physics, m, geometry, values) for m in physics.methods}
+        assert each[found.method] <= tolerance
+        costs = [m.cost(geometry, ranges).of(2 * CHECKS) for m in physics.methods]
+        kept = [c for c, m in zip(costs, physics.methods, strict=True) if each[m.name] <= tolerance]
+        dearer += found.cost > DEARER * min(kept)
+        forget()
+    assert dearer <= 1
+
+
+def named(tolerance: float, uses: int = 1, **ranges: tuple[float, float]) -> Adequate:
+    theta_r = np.linspace(-60, 60, 41)
+    scan = Geometry.from_degrees(theta_i=30.0, theta_r=theta_r)
+    return cheapest("rough", scan, {**POINT, **ranges}, tolerance, uses=uses)
+
+
+def test_a_scan_needs_no_more_than_its_tolerance() -> None:
+    """In words: 1 lamp, a scan of 60 degrees, sigma 20: the forms, the table, the integral."""
+    assert named(0.5).method == "lambert"
+    assert named(0.12).method == "qualitative"
+    assert named(0.08).method == "functional"
+    assert named(1e-3).method == "table"
+    assert named(1e-8).method == "fine"
+    assert named(1e-3, sigma_deg=(0.0, 0.0)).method == "lambert"
+    # The integral of known geometries is cheaper than the table each time.
+    assert named(1e-3, uses=1000).method in ("coarse", "exact")
+
+
+def test_what_is_told_of_it() -> None:
+    found = named(0.08)
+    scan = Geometry.from_degrees(theta_i=30.0, theta_r=np.linspace(-60, 60, 41))
+    exact = oren_nayar_exact_brdf(scan, 0.8, 20.0, FINE)
+    true = np.max(np.abs(found.brdf(scan, albedo=0.8, sigma_deg=20.0) / exact - 1))
+    assert found.checked <= true + 1e-5
+    assert true <= min(found.predicted, 0.08)
+    assert 0 < found.pairs <= 41 * 3
+    assert found.cost < found.cost_of_best / 10
+
+
+def test_a_tolerance_of_each_geometry_counts_for_itself() -> None:
+    """Strict where the form is good, and lax where it is not: the form is adequate."""
+    theta = np.array([10.0, 75.0])
+    there = Geometry.from_degrees(theta_i=theta, theta_r=-theta)
+    form = PHYSICS["rough"]["functional"]
+    exact = oren_nayar_exact_brdf(there, 0.8, 20.0, FINE)
+    near, far = np.abs(form.kernel(there, albedo=0.8, sigma_deg=20.0) / exact - 1)
+    assert near < far / 3
+    among = ["functional"]
+    each = np.array([1.05 * near, 1.05 * far])
+    assert cheapest("rough", there, POINT, each, among=among).method == "functional"
+    assert cheapest("rough", there, POINT, each[::-1], among=among).method == "fine"
+    assert cheapest("rough", there, POINT, 0.95 * far, among=among).method == "fine"
+
+
+def test_beyond_the_maps_it_checks() -> None:
+    """At grazing no map says anything; a few geometries are worked out instead."""
+    grazing = Geometry.from_degrees(theta_i=[86.0, 89.0], theta_r=[10.0, 5.0])
+    found = cheapest("rough", grazing, POINT, 0.3)
+    assert found.method in ("lambert", "qualitative", "functional")
+    assert np.isinf(found.predicted)
+    assert 0 < found.checked <= 0.3
+
+
+def test_a_narrow_lobe_is_followed_where_it_can_be_seen() -> None:
+    mirror = Geometry.from_degrees(theta_i=30.0, theta_r=np.linspace(-80, 80, 161))
+    very_rough = {"scale": (1.0, 1.0), "sigma_h": (20.0, 20.0), "correlation_length": (200.0,) * 2}
+    found = cheapest("lobe", mirror, very_rough, 0.01)
+    assert found.method == "rough"
+    smooth = {**very_rough, "sigma_h": (0.001, 0.001), "correlation_length": (3.0, 3.0)}
+    assert cheapest("lobe", mirror, smooth, 0.01).method == "smooth"
+    between = {**very_rough, "sigma_h": (5.0, 5.0), "correlation_length": (50.0, 50.0)}
+    assert cheapest("lobe", mirror, between, 1e-6).method == "adaptive"
+
+
+def test_a_smooth_body_takes_a_low_order_for_few_geometries_and_none_for_many() -> None:
+    """An order saves part of making a series, which of many geometries is no part to speak of."""
+    random = np.random.default_rng(1)
+    ranges = {"single_scattering_albedo": (0.5, 0.9), "n": (1.3, 1.7)}
+    few = cheapest("smooth", angles(random, 50, 70.0), ranges, 0.1)
+    assert few.method.startswith("order")
+    assert few.cost_of_best < 1.4 * few.cost
+    assert cheapest("smooth", angles(random, 50, 70.0), ranges, 1e-5).method == "exact"
+    many = cheapest("smooth", angles(random, 20_000, 70.0), ranges, 0.1)
+    assert many.cost_of_best < 1.05 * many.cost
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        (("smoth", POINT, 0.1), KeyError, "unknown physics 'smoth'; known: rough, smooth, lobe"),
+        (("rough", {"albedo": (0.1, 0.2)}, 0.1), ValueError, "rough needs a range of sigma_deg: 0"),
+        (("rough", {**POINT, "n": (1, 2)}, 0.1), ValueError, "rough has no parameter n; it has"),
+        (("rough", {**POINT, "albedo": (0.2, 1.2)}, 0.1), ValueError, "albedo = 1.2; allowed: 0 t"),
+        (("rough", {**POINT, "albedo": (0.2, 0.1)}, 0.1), ValueError, "a range that rises"),
+        (("rough", POINT, 1e-9), ValueError, "tolerance = 1e-09; the most accurate method, fine"),
+        (("rough", POINT, float("nan")), ValueError, "tolerance = nan"),
+    ],
+)
+def test_what_cannot_be_asked(
+    arguments: tuple[str, Ranges, float], error: type[Exception], message: str
+) -> None:
+    name, ranges, tolerance = arguments
+    with pytest.raises(error, match=message):
+        cheapest(name, Geometry.from_degrees(theta_i=10, theta_r=20), ranges, tolerance)
+
+
+def test_a_method_that_is_not_there() -> None:
+    here = Geometry.from_degrees(theta_i=10, theta_r=20)
+    with pytest.raises(KeyError, match="unknown method 'cubic' of rough; known: lambert, qual"):
+        cheapest("rough", here, POINT, 0.1, among=["cubic"])
+
+
+def test_asking_costs_less_than_it_saves() -> None:
+    """Of 2000 geometries: where bounds settle it, a tenth of the integral that is not needed."""
+    random = np.random.default_rng(2)
+    theta_i, theta_r = random.uniform(0, 50, (2, 2000))
+    anywhere = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=90.0)
+
+    def ask() -> None:
+        forget()
+        assert cheapest("rough", anywhere, POINT, 0.035).method == "functional"
+
+    def integrate() -> None:
+        forget()
+        oren_nayar_exact_brdf(anywhere, 0.8, 20.0)
+
+    assert cpu_seconds(ask, 3) < 0.2 * cpu_seconds(integrate, 2)

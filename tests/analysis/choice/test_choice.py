@@ -1,0 +1,154 @@
+"""The choice of a model: structure is found when it is there, and only then."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.choice.choice import choose
+from analysis.choice.fit_json import to_json
+from analysis.choice.ladder import LADDER
+from analysis.data.acceptance import Acceptance
+from analysis.data.measurements import Measurements
+from analysis.models import MODELS
+from instrument.errors import NotDetermined
+from instrument.geometry import Geometry
+from tests.support.seeded_scan import DIFFUSE, GLOSSY, RIG, scan, scan_angles
+
+GLOSS = "oren_nayar+torrance_sparrow"
+FEW = ("lambert", "oren_nayar", "lambert+torrance_sparrow", GLOSS)  # where no model fits any better
+
+
+def seeds(slow: bool) -> range:
+    """Scans of each sample: one, or with `pytest --slow` three."""
+    return range(3 if slow else 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("acceptance", [None, RIG], ids=["plain", "averaged"])
+@pytest.mark.parametrize(("sigma", "albedo"), DIFFUSE)
+def test_diffuse_samples(
+    sigma: float, albedo: float, acceptance: Acceptance | None, slow: bool
+) -> None:
+    for seed in seeds(slow):
+        m = scan("oren_nayar", seed, acceptance=acceptance, albedo=albedo, sigma_deg=sigma)
+        found = choose(m, acceptance)
+        assert (found.chosen, found.verdict) == ("oren_nayar", "adequate"), found.reason
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("acceptance", [None, RIG], ids=["plain", "averaged"])
+@pytest.mark.parametrize(("sigma", "albedo", "ks"), GLOSSY)
+def test_glossy_samples(
+    sigma: float, albedo: float, ks: float, acceptance: Acceptance | None, slow: bool
+) -> None:
+    for seed in seeds(slow):
+        m = scan(GLOSS, seed, acceptance=acceptance, albedo=albedo, sigma_deg=sigma, ks=ks)
+        found = choose(m, acceptance)
+        assert (found.chosen, found.verdict) == (GLOSS, "adequate"), found.reason
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "truth"),
+    [
+        ("lambert", {"albedo": 0.8}),
+        ("oren_nayar_qualitative", {"albedo": 0.8, "sigma_deg": 25.0}),
+        ("lambert+torrance_sparrow", {"albedo": 0.7, "sigma_deg": 6.0, "ks": 0.05}),
+        ("lambert+torrance_sparrow", {"albedo": 0.7, "sigma_deg": 2.0, "ks": 0.05}),
+    ],
+)
+@pytest.mark.parametrize("u_tile", [0.0, 0.005])
+def test_other_samples(name: str, truth: dict[str, float], u_tile: float, slow: bool) -> None:
+    for seed in seeds(slow):
+        found = choose(scan(name, seed, u_tile=u_tile, **truth))
+        assert (found.chosen, found.verdict) == (name, "adequate"), found.reason
+
+
+def test_a_small_unknown_error_makes_no_lobe() -> None:
+    m = scan("oren_nayar", 1, albedo=0.9, sigma_deg=30)
+    for error in (np.cos(2 * np.radians(m.theta_r_deg)), m.theta_r_deg / 80, m.theta_r_deg > 0):
+        found = choose(replace(m, brdf=m.brdf * (1 + 5e-4 * error)))  # as large as the noise
+        assert found.chosen == "oren_nayar", found.reason
+
+
+def test_none_adequate_says_where() -> None:
+    m = scan("lambert", 1, albedo=0.5)
+    peak = 1 + 0.3 * np.exp(-(((m.theta_r_deg - 20) / 8) ** 2))
+    found = choose(replace(m, brdf=m.brdf * peak), models=FEW)
+    assert found.verdict == "none adequate"
+    assert found.chosen in FEW
+    assert re.search(r"worst at theta_i \d+, dphi 0 degrees: theta_r (5|10|15) to ", found.reason)
+
+
+def test_not_identifiable() -> None:
+    found = choose(scan("lambert", 1, albedo=0.8), models=["lambert+torrance_sparrow"])
+    assert found.chosen == "lambert+torrance_sparrow"
+    assert found.verdict == "not identifiable"
+    assert "sigma_deg" in found.reason
+    entry = to_json(found)["candidates"][0]["parameters"]["sigma_deg"]
+    assert entry["u"] is None
+    assert entry["interval"] == [0.5, 60.0]
+
+
+def test_without_stated_u() -> None:
+    m = scan(GLOSS, 1, albedo=0.75, sigma_deg=42, ks=0.34)
+    found = choose(Measurements.bare(m.theta_i_deg, m.theta_r_deg, m.dphi_deg, m.brdf))
+    assert (found.chosen, found.verdict) == (GLOSS, "adequate")
+    rng = np.random.default_rng(0)
+    wild = Measurements.bare(m.theta_i_deg, m.theta_r_deg, 0.0, rng.uniform(0.05, 0.3, m.size))
+    assert choose(wild, models=FEW).verdict == "none adequate"
+
+
+@pytest.mark.parametrize("name", ["lambert", "oren_nayar_qualitative", "oren_nayar", GLOSS])
+def test_data_without_noise(name: str) -> None:
+    truth = {p.name: 0.3 if p.name == "ks" else p.default for p in MODELS[name].parameters}
+    theta_i, theta_r, dphi = scan_angles()
+    geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
+    value = MODELS[name].brdf(geometry, **truth)
+    found = choose(Measurements.bare(theta_i, theta_r, dphi, value))
+    assert (found.chosen, found.verdict) == (name, "adequate")
+    best = next(c for c in found.candidates if c.model == name)
+    assert dict(best.values) == pytest.approx(truth, rel=1e-4)
+
+
+def test_json_as_agreed() -> None:
+    found = choose(scan("lambert", 1, albedo=0.8))
+    written = to_json(found)
+    assert json.loads(json.dumps(written, allow_nan=False)) == written
+    assert list(written) == ["chosen", "verdict", "reason", "symmetry", "candidates"]
+    assert written["symmetry"]["says"] == "smooth"
+    assert {c["model"] for c in written["candidates"]} <= set(LADDER)
+    for candidate in written["candidates"]:
+        assert list(candidate) == [
+            "model", "parameters", "rms_relative", "reduced_chi2", "bic", "aicc", "converged",
+            "message",
+        ]  # fmt: skip
+        for entry in candidate["parameters"].values():
+            assert set(entry) == ({"value", "u"} if entry["u"] else {"value", "u", "interval"})
+
+
+def test_few_points() -> None:
+    two = Measurements.bare(30, [0, 20], 0, 0.2, 1e-3)
+    found = choose(two)
+    assert found.chosen == "lambert"
+    assert "left out, too few points" in found.reason
+    assert max(len(c.values) for c in found.candidates) == 2
+    with pytest.raises(NotDetermined, match="too few to fit any"):
+        choose(two, models=[GLOSS])
+
+
+def test_unknown_models_are_named() -> None:
+    with pytest.raises(KeyError, match="phong"):
+        choose(scan("lambert", 1, albedo=0.8), models=["phong"])
+
+
+def test_bic_of_stated_u_is_chi2_and_penalty() -> None:
+    m = scan("lambert", 1, albedo=0.8)
+    for c in choose(m, models=["lambert", "oren_nayar"]).candidates:
+        assert c.bic == pytest.approx((c.chi2 or 0) + len(c.values) * math.log(m.size))

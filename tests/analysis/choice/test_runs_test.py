@@ -1,0 +1,180 @@
+"""Structure in residuals: sweeps as they were driven, runs of one sign, and where a model fails."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from analysis.choice.runs_test import Stretch, failures, runs_probability
+from analysis.data.measurements import Measurements
+from analysis.data.sweeps import in_plane, signed_view, sweeps
+from instrument.geometry import FloatArray, Geometry
+from tests.support.seeded_scan import scan_angles
+
+
+def three_sweeps(order: FloatArray | None = None) -> Measurements:
+    """96 points; `order`: the order in which they were measured."""
+    theta_i, theta_r, dphi = scan_angles()
+    chosen = np.arange(theta_i.size) if order is None else np.argsort(order)
+    return Measurements.bare(theta_i[chosen], theta_r[chosen], dphi[chosen], 0.2, 1e-3)
+
+
+def test_sweeps_are_by_incidence_and_plane_with_rising_view() -> None:
+    m = three_sweeps(np.random.default_rng(1).uniform(size=96))
+    found = sweeps(m)
+    assert [(s.theta_i_deg, s.dphi_deg, s.points.size) for s in found] == [
+        (30, 0, 32),
+        (45, 0, 32),
+        (60, 0, 32),
+    ]
+    for sweep in found:
+        assert np.all(np.diff(m.theta_r_deg[sweep.points]) > 0)
+        assert np.all(m.theta_i_deg[sweep.points] == sweep.theta_i_deg)
+
+
+@pytest.mark.parametrize("plane", [0.0, 40.0, 179.0])
+@pytest.mark.parametrize("off", [0.0, 1e-4, -1e-4, 1e-12, -1e-12])
+def test_both_forms_of_a_geometry_are_one_sweep(plane: float, off: float) -> None:
+    """Also where an azimuth is off by rounding: 179.9999 degrees is the far half of 0's plane."""
+    view = np.array([-60.0, -30.0, 0.0, 20.0, 50.0])
+    signed = Measurements.bare(45.0, view, plane, 0.2)
+    behind = np.where(view < 0, plane + 180 + off, plane)
+    unsigned = Measurements.bare(45.0, np.abs(view), np.mod(behind, 360), 0.2)
+    far = Measurements.bare(45.0, -view, plane - 180 + off, 0.2)
+    for m in (signed, unsigned, far):
+        (sweep,) = sweeps(m)
+        assert (sweep.dphi_deg, sweep.points.tolist()) == (plane, [0, 1, 2, 3, 4])
+        assert signed_view(m).tolist() == view.tolist()
+
+
+@given(
+    theta_r=st.floats(-90.0, 90.0),
+    dphi=st.integers(-720_000, 720_000).map(lambda n: n / 1000),
+)
+def test_in_plane_names_the_same_direction(theta_r: float, dphi: float) -> None:
+    m = Measurements.bare(30.0, [theta_r], dphi, 0.2)
+    plane, view = in_plane(m)
+    assert 0 <= plane[0] < 180
+    here = Geometry.from_degrees(theta_i=30.0, theta_r=view, dphi=plane)
+    assert here.theta_r_deg == pytest.approx(m.geometry.theta_r_deg)
+    if abs(theta_r) > 1e-6:
+        turn = np.radians(here.dphi_deg - m.geometry.dphi_deg)
+        assert np.cos(turn) == pytest.approx(1, abs=1e-10)
+
+
+def test_a_point_alone_is_no_sweep() -> None:
+    m = Measurements.bare([10.0, 20.0, 20.0, 20.0], [5.0, 5.0, 15.0, 5.0], [0, 0, 0, 90.0], 0.2)
+    assert [s.points.tolist() for s in sweeps(m)] == [[1, 2]]
+    assert runs_probability(m, np.array([1.0, 1, 1, 1])) == 1
+
+
+@pytest.mark.parametrize("incidences", [1, 3])
+def test_noise_is_seldom_called_structure(incidences: int) -> None:
+    """A probability below p in about that part of all scans: 0.05 of 300 is 15 +- 3.8."""
+    m = three_sweeps()
+    m = Measurements.bare(m.theta_i_deg[: 32 * incidences], m.theta_r_deg[: 32 * incidences], 0, 1)
+    rng = np.random.default_rng(7)
+    found = np.array([runs_probability(m, rng.normal(size=m.size)) for _ in range(300)])
+    for p in (0.05, 0.25, 0.5):
+        assert np.mean(found < p) <= p + 3 * np.sqrt(p * (1 - p) / 300)
+    assert np.mean(found < 0.05) <= 0.08
+    assert np.mean(found < 0.5) >= 0.3  # runs are whole numbers: rather too few
+    assert np.all(found >= 1e-4)
+
+
+def test_a_smooth_misfit_is_improbable_and_an_alternating_one_is_not() -> None:
+    m = three_sweeps()
+    noise = np.random.default_rng(2).normal(size=m.size)
+    waves = np.sin(np.radians(4 * m.theta_r_deg))
+    assert runs_probability(m, waves) < 1e-12
+    assert runs_probability(m, 2 * waves + noise) < 1e-3
+    assert runs_probability(m, (-1.0) ** np.arange(m.size)) > 0.999
+    assert runs_probability(m, np.zeros(m.size)) == 1
+    assert runs_probability(m, np.ones(m.size)) == 1  # an offset is a matter of chi2
+
+
+def test_runs_follow_the_angle_and_not_the_order_of_measurement() -> None:
+    order = np.random.default_rng(3).uniform(size=96)
+    m, shuffled = three_sweeps(), three_sweeps(order)
+    waves = np.sin(np.radians(4 * m.theta_r_deg))
+    assert runs_probability(shuffled, waves[np.argsort(order)]) == runs_probability(m, waves)
+
+
+def test_points_set_aside_have_no_sign() -> None:
+    m = three_sweeps()
+    waves = np.sin(np.radians(4 * m.theta_r_deg))
+    waves[np.abs(waves) < 0.3] = 0
+    assert runs_probability(m, waves) < 1e-9
+    kept = waves != 0
+    less = Measurements.bare(m.theta_i_deg[kept], m.theta_r_deg[kept], 0, 1.0)
+    assert runs_probability(m, waves) == pytest.approx(runs_probability(less, waves[kept]))
+
+
+def bump(m: Measurements, height: float) -> FloatArray:
+    """Alternating residuals of half a u, and `height` u at theta_i 45, theta_r 10 to 30."""
+    there = (m.theta_i_deg == 45) & (m.theta_r_deg >= 10) & (m.theta_r_deg <= 30)
+    return np.where(there, height, 0.5 * (-1.0) ** np.arange(m.size))
+
+
+@pytest.mark.parametrize("height", [4.0, -4.0])
+def test_the_failing_stretch_is_named(height: float) -> None:
+    m = three_sweeps()
+    worst, *others = failures(m, bump(m, height))
+    assert worst[:2] == (45, 0)
+    # A neighbour of the same sign may belong to it.
+    assert worst.from_deg in (5, 10)
+    assert worst.to_deg in (30, 35)
+    assert worst.mean == pytest.approx(height, rel=0.3)
+    assert worst.weight == pytest.approx(abs(height) * np.sqrt(5), rel=0.2)
+    assert others == []  # the rest is noise
+    assert "theta_i 45, dphi 0 degrees: theta_r" in str(worst)
+    assert ("(+" if height > 0 else "(-") in str(worst)
+
+
+def test_the_worst_comes_first_and_what_noise_leaves_is_not_named() -> None:
+    m = three_sweeps()
+    r = bump(m, 4.0)
+    r[m.theta_i_deg == 60] -= 2.0
+    assert [s.theta_i_deg for s in failures(m, r)] == [60, 45]
+    assert len(failures(m, r, most=1)) == 1
+    calm = failures(m, 0.5 * (-1.0) ** np.arange(m.size))
+    assert len(calm) == 1  # the worst is named in any case
+
+
+def test_a_point_set_aside_does_not_cut_a_stretch() -> None:
+    """A robust fit's outlier stands with residual 0 among neighbours of either sign."""
+    m = three_sweeps()
+    for height in (4.0, -4.0):
+        r = bump(m, height)
+        r[(m.theta_i_deg == 45) & (m.theta_r_deg == 20)] = 0
+        (worst,) = failures(m, r)
+        assert worst.from_deg <= 10
+        assert worst.to_deg >= 30
+        assert abs(worst.mean) > 2.5
+    assert failures(m, np.zeros(m.size)) == []
+
+
+@pytest.mark.parametrize(
+    ("theta_r", "dphi", "named"),
+    [
+        (35.0, 40.0, (40, 35)),
+        (-35.0, 40.0, (40, -35)),
+        (35.0, 200.0, (20, -35)),
+        (-35.0, 200.0, (20, 35)),
+    ],
+)
+def test_scattered_points_are_named_where_they_are(
+    theta_r: float, dphi: float, named: tuple[float, float]
+) -> None:
+    """One form for all: dphi below 180 degrees, theta_r signed in that plane."""
+    m = Measurements.bare([10.0, 20.0, 30.0], [15.0, theta_r, 25.0], [70.0, dphi, 110.0], 0.2)
+    assert sweeps(m) == []
+    (worst,) = failures(m, np.array([0.1, -9.0, 0.1]))
+    assert worst == Stretch(20, named[0], named[1], named[1], -9, 9)
+    here = Geometry.from_degrees(theta_i=20, theta_r=worst.from_deg, dphi=worst.dphi_deg)
+    there = m.geometry
+    assert (here.theta_r_deg, here.dphi_deg) == (there.theta_r_deg[1], there.dphi_deg[1])
+    where = f"theta_i 20, dphi {named[0]} degrees: theta_r {named[1]} degrees (-9 u)"
+    assert str(worst) == where

@@ -1,0 +1,386 @@
+"""The CSV reader: tables come back as written, and every mistake is named with its place."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.data import text_file
+from analysis.data.csv_table import read_csv
+from instrument.errors import InputError
+from tests.support.csv_texts import BARE, HEADER, PLAIN, changed, problems, read
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_a_plain_table() -> None:
+    m = read(PLAIN)
+    assert m.theta_i_deg.tolist() == [30, 30]
+    assert m.theta_r_deg.tolist() == [-20.5, 10]  # the sign is kept
+    assert m.dphi_deg.tolist() == [0, 0]
+    assert m.brdf.tolist() == [0.25, -0.001]  # noise about zero is data
+    assert m.u_random is not None
+    assert m.u_random.tolist() == [0.002, 0.002]
+    assert m.lamp_setting.tolist() == [0, 0]
+    assert m.shared == ()
+
+
+def test_u_brdf_is_stated_for_all_rows_or_for_none() -> None:
+    assert read(BARE).u_random is None
+    assert read(PLAIN.replace("0.002", " ")).u_random is None
+
+
+# Ways to write BARE that mean the same.
+SAME = {
+    "byte order mark": "\ufeff" + BARE,
+    "CRLF": BARE.replace("\n", "\r\n"),
+    "CR": BARE.replace("\n", "\r"),
+    "no end of the last line": BARE[:-1],
+    "blank lines and comments": "# plaster\n\n" + BARE.replace("\n", "\n#, a note\n  \n"),
+    "quotes and spaces": BARE.replace("30,", '"30", ').replace("brdf", ' "brdf" '),
+    "further columns": BARE.replace("\n", ',"5"" disc, matte"\n'),
+    "double further columns": BARE.replace("\n", ",,\n"),
+    "exponents": BARE.replace("30,", "+3.0E1,").replace("0.25", ".25"),
+}
+
+
+@pytest.mark.parametrize("kind", SAME)
+def test_the_same_table_written_otherwise(kind: str) -> None:
+    m, expected = read(SAME[kind]), read(BARE)
+    for name in ("theta_i_deg", "theta_r_deg", "dphi_deg", "brdf"):
+        np.testing.assert_array_equal(getattr(m, name), getattr(expected, name))
+
+
+def test_the_measurements_of_a_run() -> None:
+    """Columns of a run's own table; flagged rows are read like any other."""
+    header = "theta_i_deg,theta_r_deg,dphi_deg,radiance,u_radiance,brdf,u_brdf,window_pixels"
+    m = read(
+        f"{header},exposure_s,frames,flags,time_utc,u_noise_relative\n"
+        "30.0,-20.0,0.0,812.5,1.6,0.231,0.0011,9876.00,0.02,4,,2024-05-04T10:00:00Z,0.001\n"
+        '30.0,0.0,0.0,790.1,1.6,0.225,0.0011,9876.00,0.02,4,"saturated; small",,0.001\n'
+    )
+    assert m.brdf.tolist() == [0.231, 0.225]
+    assert m.theta_r_deg.tolist() == [-20.0, 0.0]
+
+
+def test_one_direction_by_other_angles_is_another_setting() -> None:
+    rows = ["30,0,0,.2", "30,0,90,.2", "30,-20,0,.2", "30,20,180,.2", "0,20,0,.2", "0,20,90,.2"]
+    m = read("\n".join(["theta_i_deg,theta_r_deg,dphi_deg,brdf", *rows]))
+    assert m.size == 6
+    assert len(set(m.lamp_setting.tolist())) == 5  # (30, 0) serves two of them
+
+
+# What to replace in which table, by what, and the whole message, counted by hand.
+MISTAKES = {
+    "text": (
+        PLAIN,
+        "0.25",
+        "dark",
+        "2:12: brdf: 'dark' is text; allowed: -1e15 to 1e15 1/sr",
+    ),
+    "text in quotes, behind spaces": (
+        PLAIN,
+        "0.25",
+        '  "da""rk"',
+        "2:14: brdf: 'da\"rk' is text; allowed: -1e15 to 1e15 1/sr",
+    ),
+    "long text": (
+        PLAIN,
+        "0.25",
+        "x" * 99,
+        f"2:12: brdf: '{'x' * 40}...' is text; allowed: -1e15 to 1e15 1/sr",
+    ),
+    "underscore": (
+        PLAIN,
+        "0.25",
+        "1_0",
+        "2:12: brdf: '1_0' is text; allowed: -1e15 to 1e15 1/sr",
+    ),
+    "decimal comma in quotes": (
+        PLAIN,
+        "-20.5",
+        '"-20,5"',
+        "2:4: theta_r_deg: '-20,5' is text; allowed: a number from -90 to 90 deg (write -20.5)",
+    ),
+    "decimal comma without quotes": (
+        PLAIN,
+        "0.25",
+        "0,25",
+        "2:17: row: 6 fields; allowed: 5, as in the header (line 1)"
+        " (decimal numbers take a point; text with a comma needs quotes)",
+    ),
+    "nan": (PLAIN, "0.25", "nan", "2:12: brdf: 'nan' is not finite; allowed: -1e15 to"),
+    "infinite": (PLAIN, "0.25", "-inf", "2:12: brdf: '-inf' is not finite; allowed: -1e15 to"),
+    "overflow": (PLAIN, "0.25", "1e999", "2:12: brdf: '1e999' is not finite; allowed: -1e15 to"),
+    "azimuth not finite": (
+        PLAIN,
+        "-20.5,0",
+        "-20.5,inf",
+        "2:10: dphi_deg: 'inf' is not finite; allowed: a finite number of deg",
+    ),
+    "empty angle": (
+        PLAIN,
+        "-20.5",
+        "",
+        "2:4: theta_r_deg: is empty; allowed: a number from -90 to 90 deg",
+    ),
+    "blank angle": (
+        PLAIN,
+        "-20.5",
+        "  ",
+        "2:4: theta_r_deg: is empty; allowed: a number from -90 to 90 deg",
+    ),
+    "brdf empty in one row": (
+        PLAIN,
+        "0.25",
+        "",
+        "2:12: brdf: is empty here, but not in every row; allowed: -1e15 to 1e15 1/sr",
+    ),
+    "u_brdf empty in one row": (
+        PLAIN,
+        "0.25,0.002",
+        "0.25,",
+        "2:17: u_brdf: is empty here, but not in every row; allowed: 1e-15 to 1e15 1/sr",
+    ),
+    "u_brdf zero": (
+        PLAIN,
+        "0.25,0.002",
+        "0.25,0.0",
+        "2:17: u_brdf: 0.0 1/sr; allowed: 1e-15 to 1e15 1/sr",
+    ),
+    "u_brdf negative": (
+        PLAIN,
+        "0.25,0.002",
+        "0.25,-2e-3",
+        "2:17: u_brdf: -2e-3 1/sr; allowed: 1e-15 to 1e15 1/sr",
+    ),
+    "incidence past 90": (
+        PLAIN,
+        "30,-20.5",
+        "90.0001,-20.5",
+        "2:1: theta_i_deg: 90.0001 deg; allowed: a number from 0 to 90 deg",
+    ),
+    "incidence below 0": (
+        PLAIN,
+        "30,-20.5",
+        "-30,-20.5",
+        "2:1: theta_i_deg: -30 deg; allowed: a number from 0 to 90 deg",
+    ),
+    "view past -90": (
+        PLAIN,
+        "-20.5",
+        "-91",
+        "2:4: theta_r_deg: -91 deg; allowed: a number from -90 to 90 deg",
+    ),
+    "view past 90": (
+        PLAIN,
+        "-20.5",
+        "90.5",
+        "2:4: theta_r_deg: 90.5 deg; allowed: a number from -90 to 90 deg",
+    ),
+    "too few fields": (
+        PLAIN,
+        ",0.25,0.002",
+        "",
+        "2:11: row: 3 fields; allowed: 5, as in the header (line 1)",
+    ),
+    "one field": (
+        BARE,
+        "30,10,0,0.24",
+        "the end",
+        "3:8: row: 1 field; allowed: 4, as in the header (line 1)",
+    ),
+    "semicolons in one row": (
+        BARE,
+        "30,10,0,0.24",
+        "30;10;0;0,24",
+        "3:13: row: 2 fields; allowed: 4, as in the header (line 1)"
+        " (separate fields by commas, not by ';')",
+    ),
+    "too many fields": (
+        BARE,
+        "0.24",
+        "0.24,",
+        "3:14: row: 5 fields; allowed: 4, as in the header (line 1)"
+        " (decimal numbers take a point; text with a comma needs quotes)",
+    ),
+    "the same geometry": (
+        BARE,
+        "30,10,0,0.24",
+        " 3e1,-20.50,-0,0.24",
+        "3:2: theta_i_deg: the same three angles stand already in line 2;"
+        " allowed: each geometry once",
+    ),
+    "quote not closed": (
+        PLAIN,
+        "-20.5",
+        '"-20.5',
+        "2:4: row: '\"-20.5': the quote is not closed before the next comma or the line's end;"
+        ' allowed: text in quotes, with "" for a quote inside it',
+    ),
+    "quote closed too early": (
+        PLAIN,
+        "-20.5",
+        '"-20".5',
+        "2:4: row: '\"-20\".5': the quote is not closed before the next comma or the line's end;"
+        ' allowed: text in quotes, with "" for a quote inside it',
+    ),
+    "quote not closed in the header": (
+        BARE,
+        "brdf",
+        '"brdf',
+        "1:34: header: '\"brdf': the quote is not closed before the next comma or the line's end;"
+        ' allowed: text in quotes, with "" for a quote inside it',
+    ),
+    "column missing": (
+        BARE,
+        "dphi_deg",
+        "phi,",
+        "1:1: dphi_deg: the column is missing; found: theta_i_deg, theta_r_deg, phi, '', brdf;"
+        f" allowed: {HEADER}",
+    ),
+    "column double": (
+        PLAIN,
+        ",u_brdf",
+        ", brdf",
+        "1:40: brdf: the column stands twice, first at column 34; keep one of them",
+    ),
+    "semicolons": (
+        BARE,
+        BARE,
+        BARE.replace(",", ";").replace(".", ","),
+        "1:12: header: fields are separated by ';': use commas, and a point in decimal numbers",
+    ),
+    "tabs": (
+        BARE,
+        BARE,
+        BARE.replace(",", "\t"),
+        "1:12: header: fields are separated by tabs: use commas, and a point in decimal numbers",
+    ),
+    "spaces": (
+        BARE,
+        BARE,
+        BARE.replace(",", " "),
+        "1:12: header: fields are separated by spaces: use commas, and a point in decimal numbers",
+    ),
+    "header alone": (
+        BARE,
+        BARE[BARE.index("\n") :],
+        "\n# no row\n",
+        "1:1: header: no row follows; allowed: a row for each geometry",
+    ),
+    "nothing": (BARE, BARE, "", f"1:1: the file is empty; allowed: {HEADER}, and a row for each"),
+    "blank": (BARE, BARE, "\n \n", f"1:1: the file is empty; allowed: {HEADER}, and a row for"),
+}
+
+
+@pytest.mark.parametrize("kind", MISTAKES)
+def test_a_mistake(kind: str) -> None:
+    text, old, new, message = MISTAKES[kind]
+    (found, *more) = problems(changed(text, old, new))
+    if kind == "column missing":  # by the comma too many in the header
+        assert more.pop(0).startswith("data.csv:2:16: row: 4 fields; allowed: 5")
+        assert more.pop(0).startswith("data.csv:3:13: row: 4 fields; allowed: 5")
+    assert found.startswith(f"data.csv:{message}")
+    assert (
+        len(found) - len(f"data.csv:{message}") < 30
+    )  # the words left out are those of a sentence above
+    assert not more
+
+
+def test_an_empty_brdf_in_every_row_has_its_own_message() -> None:
+    header = "theta_i_deg,theta_r_deg,dphi_deg,radiance,brdf,u_brdf\n"
+    assert problems(header + "30,0,0,812.5,,\n30,10,0,790.1, ,\n") == (
+        "data.csv:1:43: brdf: is empty in every row: no reference was taken, so there is no BRDF"
+        " to fit; allowed: a scan with a white tile",
+    )
+
+
+def test_all_mistakes_are_reported_at_once_by_place() -> None:
+    found = problems(
+        "theta_i_deg,theta_r_deg,dphi_deg,brdf,u_brdf,brdf\n"
+        "95,91,x,.2,0,\n"
+        "30,0\n"
+        "\n"
+        "30,0,0,,1,\n"
+        "30,0,0,.2,1,\n"
+        '30,0,"0,.2,1,\n'
+    )
+    starts = [":".join(line.split(":")[:4]) for line in found]
+    assert starts == [
+        "data.csv:1:46: brdf",
+        "data.csv:2:1: theta_i_deg",
+        "data.csv:2:4: theta_r_deg",
+        "data.csv:2:7: dphi_deg",
+        "data.csv:2:12: u_brdf",
+        "data.csv:3:5: row",
+        "data.csv:5:8: brdf",
+        "data.csv:6:1: theta_i_deg",
+        "data.csv:7:6: row",
+    ]
+    assert found[-2].endswith("already in line 5; allowed: each geometry once")
+
+
+def test_missing_columns_are_all_named() -> None:
+    found = problems("theta_i_deg,\x1b[31m\n30,\n")
+    assert [line.split(":")[3] for line in found] == [" theta_r_deg", " dphi_deg", " brdf"]
+    assert all(r"found: theta_i_deg, '\x1b[31m'; allowed:" in line for line in found)
+    wide = ",".join(f"c{n}" for n in range(30))
+    assert "c18, c19, ...; allowed" in problems(wide)[0]
+
+
+def test_no_more_than_twenty_mistakes_are_reported() -> None:
+    rows = "".join(f"{n},0,0,x\n" for n in range(21))
+    found = problems("theta_i_deg,theta_r_deg,dphi_deg,brdf\n" + rows)
+    assert [line.split(":")[1] for line in found[:-1]] == [str(n) for n in range(2, 22)]
+    assert found[-1] == "... and 1 more"
+    assert len(problems("theta_i_deg,theta_r_deg,dphi_deg,brdf\n" + rows[:-9])) == 20
+
+
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
+@pytest.mark.parametrize("end", [b"\n", b"\r\n"])
+def test_text_that_is_not_utf_8(mark: bytes, end: bytes) -> None:
+    content = BARE.replace("0.24", "0.24é °").encode().replace(b"\n", end)
+    broken = content.replace("°".encode(), b"\xb0")
+    assert problems(mark + broken) == (
+        "data.csv:3:15: byte 0xb0 is not UTF-8 text; save the file as UTF-8",
+    )
+
+
+def test_a_table_in_utf_16_is_not_guessed() -> None:
+    assert problems(BARE.encode("utf-16"))[0].startswith("data.csv:1:1: byte 0xff is not UTF-8")
+
+
+def test_a_file_that_cannot_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    def problem(path: str) -> str:
+        with pytest.raises(InputError) as caught:
+            read_csv(Path(path))
+        return str(caught.value)
+
+    assert problem("nowhere.csv") == "nowhere.csv: no such file; check its name and folder"
+    assert problem(".") == ".: is a folder; allowed: a text file"
+    Path("file").touch()
+    assert problem("file/a.csv").startswith("file/a.csv: cannot be read: Not a directory; check")
+    assert problem("a\0b").startswith("'a\\x00b': cannot be read: embedded null byte; check")
+
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, os.strerror(13))
+
+    Path("secret.csv").touch()
+    monkeypatch.setattr(Path, "open", refuse)
+    words = "secret.csv: cannot be read: Permission denied; check its name and permissions"
+    assert problem("secret.csv") == words
+
+
+def test_a_file_that_is_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert text_file.MAX_BYTES == 64 * 1024**2
+    monkeypatch.setattr(text_file, "MAX_BYTES", 1024**2)
+    fitting = (BARE + "#").ljust(1024**2, "x")
+    assert read(fitting).size == 2
+    assert problems(fitting + "x") == ("data.csv: the file is too large; allowed: 1 MB; split it",)

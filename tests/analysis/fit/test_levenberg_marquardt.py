@@ -1,0 +1,299 @@
+"""The descent: SciPy's minima, bounds reached exactly, and no claim of a minimum where none is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import OptimizeResult, least_squares, lsq_linear
+
+from analysis.fit.levenberg_marquardt import HUBER, Minimum, descend, loss, weights
+from instrument.geometry import FloatArray
+
+T = np.linspace(0, 3, 25)
+NOISE = 0.02
+NEUTRAL = np.array([0.7, 0.3, 0.0, 0.0])  # of the parameters that a task leaves out
+SEEDS = range(60)
+# Where a bound lies below the truth, how far the other is above it, and where to start between.
+BOX = st.tuples(st.floats(-1, 1), st.floats(0.05, 3), st.floats(0, 1))
+
+Curve = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+
+
+def exponential(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """a exp(-b t) + c + d t and its slopes, with as many of a, b, c, d as are given."""
+    a, b, c, d = np.append(x, NEUTRAL[x.size :])
+    decay = np.exp(-b * T)
+    slopes = np.stack([decay, -a * T * decay, np.ones_like(T), T], axis=1)
+    return a * decay + c + d * T, slopes[:, : x.size]
+
+
+def rational(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(a + c t) / (1 + b t + d t^2) and its slopes, with as many of a, b, c, d as are given."""
+    a, b, c, d = np.append(x, NEUTRAL[x.size :])
+    above, below = a + c * T, 1 + b * T + d * T * T
+    slopes = np.stack([1 / below, -above * T / below**2, T / below, -above * T * T / below**2], 1)
+    return above / below, slopes[:, : x.size]
+
+
+CURVES: tuple[Curve, ...] = (exponential, rational)
+
+
+@dataclass
+class Task:
+    """Fit a curve to `y` with u = NOISE, within bounds."""
+
+    curve: Curve
+    y: FloatArray
+    start: FloatArray
+    low: FloatArray
+    high: FloatArray
+    huber: float | None = None
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        return (self.curve(x)[0] - self.y) / NOISE
+
+    def jacobian(self, x: FloatArray) -> FloatArray:
+        return self.curve(x)[1] / NOISE
+
+    def solve(self) -> Minimum:
+        return descend(self.residual, self.jacobian, self.start, self.low, self.high, self.huber)
+
+    def scipy(self, start: FloatArray) -> float:
+        """SciPy's minimum of chi2 or the robust loss; it starts off the bounds."""
+        off = 1e-9 * (self.high - self.low)
+        found: OptimizeResult = least_squares(
+            self.residual, np.clip(start, self.low + off, self.high - off), self.jacobian,
+            bounds=(self.low, self.high), x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14,
+            loss="linear" if self.huber is None else "huber", f_scale=self.huber or 1.0,
+            max_nfev=500,
+        )  # fmt: skip
+        return 2 * float(found.cost)
+
+
+def true_values(rng: np.random.Generator) -> FloatArray:
+    k = int(rng.integers(1, 5))
+    return np.array([1.0, 0.8, 0.5, 0.2])[:k] * rng.uniform(0.5, 2, size=k)
+
+
+def task(seed: int, huber: float | None = None, noise: float = NOISE) -> Task:
+    """A random one of 1 to 4 parameters; with noise, half of them may end on a bound."""
+    rng = np.random.default_rng(seed)
+    curve, truth = CURVES[seed % 2], true_values(rng)
+    k = truth.size
+    y = curve(truth)[0] + noise * rng.normal(size=T.size)
+    if huber is not None:
+        y += (rng.uniform(size=T.size) < 0.1) * rng.normal(size=T.size)
+    low = truth * (rng.choice([0.0, 1.1], size=k) if noise and seed % 4 > 1 else 0.0)
+    high = low + truth * rng.uniform(1.2, 4, size=k)
+    start = low + (high - low) * rng.uniform(0.2, 0.8, size=k)
+    return Task(curve, y, start, low, high, huber)
+
+
+@pytest.mark.parametrize("huber", [None, HUBER])
+def test_it_finds_the_minima_that_scipy_finds(huber: float | None) -> None:
+    """SciPy's huber loss is the same sum: z up to 1, then 2 sqrt(z) - 1, of z = (r / HUBER)^2."""
+    for seed in SEEDS:
+        problem = task(seed, huber)
+        found = problem.solve()
+        assert found.converged, (seed, found.message)
+        assert found.chi2 == pytest.approx(problem.scipy(problem.start), rel=1e-6), seed
+        assert found.chi2 == loss(problem.residual(found.x), huber)
+
+
+@settings(max_examples=60, derandomize=True)
+@given(
+    curve=st.sampled_from(CURVES),
+    truth=st.lists(st.floats(0.1, 2.0), min_size=1, max_size=4),
+    box=st.lists(BOX, min_size=4, max_size=4),
+    huber=st.sampled_from([None, HUBER]),
+)
+def test_where_it_says_converged_scipy_finds_no_way_down(
+    curve: Curve,
+    truth: list[float],
+    box: list[tuple[float, float, float]],
+    huber: float | None,
+) -> None:
+    below, width, part = np.array(box[: len(truth)]).T
+    low = np.maximum(np.array(truth) + below, 0.0)
+    y = curve(np.array(truth))[0] + NOISE * np.sin(40 * T)
+    problem = Task(curve, y, low + part * width, low, low + width, huber)
+    found = problem.solve()
+    assert np.all((low <= found.x) & (found.x <= low + width))
+    if found.converged:
+        assert found.chi2 <= problem.scipy(found.x) * (1 + 1e-6) + 1e-12
+
+
+def test_it_nearly_always_converges() -> None:
+    assert sum(task(seed).solve().converged for seed in range(400)) >= 398
+
+
+def test_noise_free_data_are_recovered() -> None:
+    for seed in SEEDS:
+        found = task(seed, noise=0.0).solve()
+        assert found.converged
+        assert found.x == pytest.approx(true_values(np.random.default_rng(seed)), rel=1e-8), seed
+
+
+def linear(seed: int, alike: float = 1.0) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Columns (30, 3) that differ by the part `alike`, data (30,), and about the minimum (3,)."""
+    rng = np.random.default_rng(seed)
+    A = alike * rng.normal(size=(30, 3)) + (1 - alike) * rng.normal(size=(30, 1))
+    x = rng.normal(size=3)
+    return A, A @ x + 0.3 * rng.normal(size=30), x
+
+
+def line(A: FloatArray, b: FloatArray, start: FloatArray, low: FloatArray, high: FloatArray) -> int:
+    """Evaluations that the linear problem takes, after a comparison with SciPy's exact minimum."""
+    points: list[FloatArray] = []
+
+    def residual(x: FloatArray) -> FloatArray:
+        points.append(x)
+        return A @ x - b
+
+    found = descend(residual, lambda _: A, start, low, high)
+    reference = lsq_linear(A, b, (low, high), method="bvls")
+    assert found.converged
+    assert found.chi2 == pytest.approx(2 * reference.cost, rel=1e-8)
+    return len(points)
+
+
+def test_a_linear_problem_takes_a_few_steps() -> None:
+    for seed in SEEDS:
+        A, b, _ = linear(seed)
+        assert line(A, b, np.zeros(3), np.full(3, -9.0), np.full(3, 9.0)) <= 5
+
+
+@pytest.mark.parametrize("alike", [1.0, 0.1, 0.01])
+def test_bounds_and_columns_nearly_alike_do_not_stop_it_early(alike: float) -> None:
+    """Cut at several bounds at once, a step along a valley would leave the valley."""
+    for seed in SEEDS:
+        A, b, x = linear(seed, alike)
+        rng = np.random.default_rng(seed)
+        low = x - rng.uniform(-0.5, 2, size=3)
+        high = low + rng.uniform(0.1, 4, size=3)
+        line(A, b, low + rng.uniform(size=3) * (high - low), low, high)
+
+
+@pytest.mark.parametrize("bound", [0.7 / 1.1, 0.1 + 0.2, 1 / 7])
+def test_a_minimum_on_a_bound_is_reached_exactly(bound: float) -> None:
+    """To the last bit, also where x + (bound - x) is not the bound in floating point."""
+    y = exponential(np.array([1.0, 0.05]))[0]
+    for start in np.linspace(bound, 2.0, 21):
+        low, high = np.array([0.0, bound]), np.array([2.0, 2.0])
+        held = Task(exponential, y, np.array([0.5, start]), low, high).solve()
+        assert held.converged
+        assert held.x[1] == bound
+    A = np.stack([np.ones_like(T), T], axis=1)
+    low, high = np.array([-1.0, -bound]), np.array([bound, 5.0])
+    both = descend(lambda x: A @ x - 16.2 + 9 * T, lambda _: A, np.array([-0.3, 4]), low, high)
+    assert both.converged
+    assert both.x.tolist() == [bound, -bound]
+
+
+def test_a_start_on_the_bounds_is_left_where_the_way_down_leads_inside() -> None:
+    for seed in SEEDS:
+        problem = task(seed, noise=0.0)
+        inside = problem.solve()
+        corner = Task(problem.curve, problem.y, problem.high, problem.low, problem.high)
+        found = corner.solve()
+        if found.chi2 < 1:  # from some corners another basin is reached
+            assert found.x == pytest.approx(inside.x, rel=1e-6)
+        assert found.chi2 <= corner.scipy(found.x) * (1 + 1e-6) + 1e-12
+
+
+@pytest.mark.parametrize("high", [5.0, 0.7])
+def test_two_columns_alike_share_what_they_explain(high: float) -> None:
+    A = np.stack([T, T, np.ones_like(T)], axis=1)
+    b = 1 + 2 * T + 0.1 * np.sin(9 * T)
+    low, top = np.full(3, -5.0), np.full(3, high)
+    found = descend(lambda x: A @ x - b, lambda _: A, np.zeros(3), low, top)
+    assert found.converged
+    reference = lsq_linear(A[:, 1:], b, (low[1:] * [2, 1], top[1:] * [2, 1]))
+    assert found.chi2 == pytest.approx(2 * reference.cost, rel=1e-8)
+    assert found.x[0] == pytest.approx(found.x[1], abs=1e-6)
+
+
+@pytest.mark.parametrize("scale", [0.0, 1.0])
+def test_a_column_of_zeros_leaves_its_parameter_alone(scale: float) -> None:
+    A = np.stack([scale * T, 0 * T], axis=1)
+    b = 1 + 2 * T
+    low, high = np.full(2, -5.0), np.full(2, 5.0)
+    found = descend(lambda x: A @ x - b, lambda _: A, np.array([0.0, 0.3]), low, high)
+    assert found.converged
+    assert found.x[1] == 0.3
+    assert found.x[0] == pytest.approx(scale * (T @ b) / (T @ T))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "minimum"),
+    [
+        ((-2, -2), (2, 2), (1, 1)),
+        ((-2, -2), (0.5, 2), (0.5, 0.25)),  # on the valley's floor y = x^2
+        ((-2, -2), (2, 0.3), (0.551423, 0.3)),  # 200 x^3 + (1 - 60) x = 1 with y = 0.3
+    ],
+)
+def test_rosenbrock_s_valley(
+    low: tuple[float, float], high: tuple[float, float], minimum: tuple[float, float]
+) -> None:
+    """Rosenbrock, The Computer Journal 3 (1960): 100 (y - x^2)^2 + (1 - x)^2 from (-1.2, 1)."""
+
+    def residual(x: FloatArray) -> FloatArray:
+        return np.array([10 * (x[1] - x[0] ** 2), 1 - x[0]])
+
+    def jacobian(x: FloatArray) -> FloatArray:
+        return np.array([[-20 * x[0], 10.0], [-1.0, 0.0]])
+
+    start = np.clip([-1.2, 1.0], low, high)
+    found = descend(residual, jacobian, start, np.array(low, float), np.array(high, float))
+    assert found.converged
+    assert found.x == pytest.approx(minimum, abs=1e-6)
+
+
+def test_no_minimum_is_claimed_with_slopes_that_are_wrong() -> None:
+    claimed = 0
+    for seed in SEEDS:
+        A, b, _ = linear(seed)
+        least = float(np.linalg.lstsq(A, b)[1][0])
+        low, high = np.full(3, -9.0), np.full(3, 9.0)
+        uphill = descend(lambda x: A @ x - b, lambda _: -A, np.zeros(3), low, high)  # noqa: B023
+        assert not uphill.converged
+        wrong = A * [-1, 1, 1]
+        mirrored = descend(lambda x: A @ x - b, lambda _: wrong, np.zeros(3), low, high)  # noqa: B023
+        claimed += mirrored.converged and mirrored.chi2 > 1.001 * least
+    assert claimed == 0
+
+
+def test_no_minimum_is_claimed_when_the_steps_run_out() -> None:
+    """Along y = x^2 to x = 1000, which pulls ten million times less than the valley's walls."""
+    far = np.array([1e7, 1e7])
+    found = descend(
+        lambda x: np.array([1e4 * (x[1] - x[0] ** 2), 1e-3 * (x[0] - 1e3)]),
+        lambda x: np.array([[-2e4 * x[0], 1e4], [1e-3, 0.0]]),
+        np.zeros(2), -far, far,
+    )  # fmt: skip
+    assert not found.converged
+    assert "100 steps" in found.message
+
+
+def test_residuals_that_are_not_numbers_are_no_minimum() -> None:
+    found = descend(
+        lambda _: np.full(3, np.nan), lambda _: np.ones((3, 1)),
+        np.array([1.0]), np.array([0.0]), np.array([2.0]),
+    )  # fmt: skip
+    assert not found.converged
+
+
+def test_huber_s_loss_is_square_then_straight() -> None:
+    """Huber 1964: continuous in value and slope; the weight is the slope over twice r."""
+    r = np.array([0.5, -1.0, HUBER, 3.0, -10.0])
+    assert loss(r[:2], HUBER) == loss(r[:2]) == 1.25
+    assert loss(r[3:4], HUBER) == pytest.approx(2 * HUBER * 3 - HUBER**2)
+    step = 1e-6
+    slope = [(loss(x + step, HUBER) - loss(x - step, HUBER)) / (2 * step) for x in r[:, np.newaxis]]
+    assert 2 * r * weights(r, HUBER) == pytest.approx(slope, abs=1e-5)
+    assert weights(r, None).tolist() == [1] * 5

@@ -1,0 +1,283 @@
+"""V-cavities against rays, a Monte Carlo of photons, adaptive quadrature and closed forms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad_vec
+
+from analysis.models.rough.v_cavity import (
+    Directions,
+    attenuation,
+    critical_angle,
+    interreflection_factor,
+    isotropic_single_slope,
+    masked_width,
+    shadowed_width,
+    unidirectional_single_slope,
+)
+from instrument.geometry import FloatArray
+
+# theta_i, theta_r, dphi in degrees: in the plane and out of it, at kinks, at and near the corners.
+GEOMETRIES = [
+    (0, 0, 0),
+    (10, 70, 60),
+    (45, 45, 0),
+    (60, 60, 90),
+    (75, 60, 180),
+    (75, 60, 0),
+    (75, 75, 180),
+    (85, 85, 0),
+    (85, 85, 180),
+    (85, 84.9, 179.5),
+    (85, 20, 60),
+    (83, 5, 83),
+    (80.3, 80.3, 179),
+    (70, 70, 150),
+    (85, 0.2, 0.02),
+]
+UP = np.array(0.0)
+
+# Rays in the cross-section of a cavity: x across the groove, z up. The facet with its normal
+# towards +x rises from the groove at the origin towards -x, its neighbour towards +x.
+
+
+def reaches(points: FloatArray, towards: FloatArray, theta_a: float, side: int) -> FloatArray:
+    """Whether light gets from points (..., 2) of the facet on that side (-1, 1) out `towards`."""
+    normal = np.array([-side * math.sin(theta_a), math.cos(theta_a)])
+    other = np.array([-side * math.cos(theta_a), math.sin(theta_a)])
+    determinant = towards[..., 1] * other[0] - towards[..., 0] * other[1]
+    determinant = np.where(determinant == 0, 1e-300, determinant)
+    # points + s towards = t other: met at the part t of the neighbour, s ahead
+    s = (points[..., 0] * other[1] - points[..., 1] * other[0]) / determinant
+    t = (points[..., 0] * towards[..., 1] - points[..., 1] * towards[..., 0]) / determinant
+    met = (s > 0) & (t >= 0) & (t <= 1)
+    return (towards @ normal > 0) & ~met
+
+
+def in_section(theta: float, azimuth: float) -> FloatArray:
+    """Direction seen in the cross-section of a groove at that azimuth from it."""
+    return np.array([math.sin(theta) * math.cos(azimuth), math.cos(theta)])
+
+
+def random_cavities(count: int, seed: int) -> Iterator[tuple[float, ...]]:
+    random = np.random.default_rng(seed)
+    for _ in range(count):
+        theta_i, theta_r, theta_a = np.radians(random.uniform(1, 89, 3))
+        phi_r, phi_a = random.uniform(0, 2 * np.pi, 2)
+        yield theta_i, theta_r, theta_a, phi_r, phi_a
+
+
+def test_the_attenuation_is_the_part_that_rays_light_and_see() -> None:
+    t = (np.arange(20000) + 0.5) / 20000
+    for theta_i, theta_r, theta_a, phi_r, phi_a in random_cavities(400, 1):
+        points = np.outer(t, [-math.cos(theta_a), math.sin(theta_a)])
+        lit = reaches(points, in_section(theta_i, phi_a), theta_a, -1)
+        seen = reaches(points, in_section(theta_r, phi_r - phi_a), theta_a, -1)
+        towards = Directions(*(np.array(x) for x in (theta_i, 0.0, theta_r, phi_r)))
+        factor = attenuation(towards, np.array(theta_a), np.array(phi_a))
+        assert factor == pytest.approx(np.mean(lit & seen), abs=1e-4)
+
+
+def test_the_interreflection_factor_is_what_a_monte_carlo_exchange_carries() -> None:
+    """Photons leave the seen part of a facet by Lambert's law and count where the next is lit."""
+    random = np.random.default_rng(2)
+    n = 200_000
+    checked = 0
+    for theta_i, theta_r, theta_a, phi_r, phi_a in random_cavities(60, 3):
+        towards = Directions(*(np.array(x) for x in (theta_i, 0.0, theta_r, phi_r)))
+        slope, azimuth = np.array(theta_a), np.array(phi_a)
+        masked = masked_width(towards, slope, azimuth)
+        shadowed = shadowed_width(towards, slope, azimuth)
+        t = random.uniform(size=n)
+        points = np.outer(t, [-math.cos(theta_a), math.sin(theta_a)])
+        sine, turn = np.sqrt(random.uniform(size=n)), random.uniform(0, 2 * np.pi, n)
+        along, out = sine * np.cos(turn), np.sqrt(1 - sine**2)
+        leaves = np.stack(
+            [
+                out * math.sin(theta_a) - along * math.cos(theta_a),
+                out * math.cos(theta_a) + along * math.sin(theta_a),
+            ],
+            axis=-1,
+        )
+        other = np.array([math.cos(theta_a), math.sin(theta_a)])
+        determinant = leaves[:, 1] * other[0] - leaves[:, 0] * other[1]
+        met = (points[:, 0] * leaves[:, 1] - points[:, 1] * leaves[:, 0]) / determinant
+        hit = ~reaches(points, leaves, theta_a, -1)
+        lit = reaches(np.outer(met, other), in_section(theta_i, phi_a), theta_a, 1)
+        seen = reaches(points, in_section(theta_r, phi_r - phi_a), theta_a, -1)
+        part = np.mean(hit & lit & seen)
+        error = math.sqrt(part * (1 - part) / n) + 1e-5
+        factor = interreflection_factor(masked, shadowed, slope)
+        assert factor / np.pi == pytest.approx(part, abs=5 * error)
+        checked += bool(0 < masked < 1 or 0 < shadowed < 1) and part > 0.01
+    assert checked > 10
+
+
+def test_open_facets_exchange_pi_times_one_minus_cosine() -> None:
+    # (24) at no masking and no shadowing, as in (48)
+    theta_a = np.radians([0.0, 10.0, 45.0, 89.0])
+    factor = interreflection_factor(UP, UP, theta_a)
+    np.testing.assert_allclose(factor, np.pi * (1 - np.cos(theta_a)), atol=1e-14)
+
+
+def test_one_facet_gives_numbers_at_the_ends_of_the_domain() -> None:
+    random = np.random.default_rng(8)
+    ends = np.array([0.0, 1e-300, 1e-9, 0.7, np.pi / 2 - 1e-9, np.pi / 2])
+    theta_i, theta_r, theta_a = random.choice(ends, (3, 3000))
+    phi_i, phi_r, phi_a = random.choice([0.0, np.pi / 2, np.pi, 2.0], (3, 3000))
+    towards = Directions(theta_i, phi_i, theta_r, phi_r)
+    with np.errstate(all="raise", under="ignore"):
+        found = [attenuation(towards, theta_a, phi_a), critical_angle(theta_i, theta_a)]
+        widths = (f(towards, theta_a, phi_a) for f in (masked_width, shadowed_width))
+        found += [interreflection_factor(*widths, theta_a)]
+        found += unidirectional_single_slope(towards, theta_a, phi_a)
+        found += isotropic_single_slope(theta_i, theta_r, phi_r, theta_a)
+    assert all(np.all(np.isfinite(value) & (value >= 0)) for value in found)
+
+
+# The isotropic single-slope surface
+
+
+def half_circle(theta_i: float, theta_r: float, dphi: float, theta_a: float) -> FloatArray:
+    """Kinks of a cavity's azimuth over half a circle, from (39) and from equal widths."""
+    phi_i, phi_r = (
+        float(critical_angle(np.array(x), np.array(theta_a))) for x in (theta_i, theta_r)
+    )
+    x, y = math.tan(theta_r) * math.cos(dphi), math.tan(theta_r) * math.sin(dphi)
+    equal = [math.atan2(s * math.tan(theta_i) - x, y) for s in (1, -1)]
+    kinks = np.array([-phi_i, phi_i, dphi - phi_r, dphi + phi_r, *equal])
+    kinks = np.sort(np.mod(kinks, np.pi))
+    return np.append(kinks, kinks[0] + np.pi)
+
+
+def printed_mean(theta_i: float, theta_r: float, dphi: float, theta_a: float) -> FloatArray:
+    """(29) by brute force: the printed (28) at 120 nodes a piece, drawn to the ends of the piece.
+
+    tanh(pi/2 sinh s) nodes: they converge whatever the ends' singularities are.
+    """
+    s = np.linspace(-3.2, 3.2, 120)
+    x, w = np.tanh(np.pi / 2 * np.sinh(s)), np.cosh(s) / np.cosh(np.pi / 2 * np.sinh(s)) ** 2
+    w *= np.pi / 2 * (s[1] - s[0])
+    kinks = half_circle(theta_i, theta_r, dphi, theta_a)
+    middle, half = (kinks[1:] + kinks[:-1]) / 2, (kinks[1:] - kinks[:-1]) / 2
+    phi = middle[:, None] + half[:, None] * x
+    towards = Directions(*(np.array(v) for v in (theta_i, 0.0, theta_r, dphi)))
+    parts = unidirectional_single_slope(towards, np.array(theta_a), phi)
+    return np.array([half @ (part @ w) / np.pi for part in parts])
+
+
+def test_the_isotropic_surface_is_the_mean_of_grooves_of_all_azimuths() -> None:
+    random = np.random.default_rng(4)
+    for theta_i, theta_r, dphi in np.radians(GEOMETRIES):
+        theta_a = random.uniform(0.01, 1.55, 12)
+        direct, twice = isotropic_single_slope(theta_i, theta_r, dphi, theta_a, 64)
+        expected = np.array([printed_mean(theta_i, theta_r, dphi, x) for x in theta_a])
+        np.testing.assert_allclose(direct, expected[:, 0], rtol=1e-9, atol=1e-11)
+        np.testing.assert_allclose(twice, expected[:, 1], rtol=1e-7, atol=1e-9)
+
+
+def test_the_isotropic_surface_against_adaptive_quadrature() -> None:
+    for theta_i, theta_r, dphi, theta_a in np.radians([(75, 60, 120, 50), (80, 40, 0, 30)]):
+        towards = Directions(*(np.array(v) for v in (theta_i, 0.0, theta_r, dphi)))
+        mean, _ = quad_vec(
+            lambda phi, t=towards, a=theta_a: np.array(
+                unidirectional_single_slope(t, np.array(a), np.array(phi))
+            ),
+            0,
+            np.pi,
+            points=half_circle(theta_i, theta_r, dphi, theta_a) % np.pi,
+            epsrel=1e-10,
+        )
+        got = isotropic_single_slope(theta_i, theta_r, dphi, theta_a, 40)
+        np.testing.assert_allclose(got, mean / np.pi, rtol=1e-8)
+
+
+def printed_in_plane(theta_i: float, theta_r: float, theta_a: float, *, same: bool) -> float:
+    """(40) and (41), over rho / pi E0 cos(theta_i)."""
+    alpha, beta = max(theta_i, theta_r), min(theta_i, theta_r)
+    ca, cb = (float(critical_angle(np.array(x), np.array(theta_a))) for x in (alpha, beta))
+    t, a, b = math.tan(theta_a), math.tan(alpha), math.tan(beta)
+    square = t * t * a * b / 2 * (1 - (2 * ca + math.sin(2 * ca)) / math.pi)
+    if same:
+        return math.cos(theta_a) * (1 + 2 * t * b * math.sin(ca) / math.pi + square)
+    cut = 2 * t * b * (math.sin(cb) - math.sin(ca)) / math.pi
+    return math.cos(theta_a) * (1 - 2 * cb / math.pi + cut - square)
+
+
+def printed_perpendicular(theta_i: float, theta_r: float, theta_a: float) -> float:
+    """(42) and (43), over rho / pi E0 cos(theta_i)."""
+    critical = sum(
+        float(critical_angle(np.array(x), np.array(theta_a))) for x in (theta_i, theta_r)
+    )
+    if critical <= math.pi / 2:
+        return math.cos(theta_a)
+    t, i, r = math.tan(theta_a), math.tan(theta_i), math.tan(theta_r)
+    roots = math.sqrt(r * r * t * t - 1) + math.sqrt(i * i * t * t - 1) - t * math.hypot(i, r)
+    return math.cos(theta_a) * (1.5 - critical / math.pi + roots / math.pi)
+
+
+@given(*(st.floats(0.01, 1.5) for _ in range(3)))
+def test_the_direct_part_is_the_papers_closed_form_in_its_two_planes(
+    theta_i: float, theta_r: float, theta_a: float
+) -> None:
+    for dphi, expected in (
+        (0.0, printed_in_plane(theta_i, theta_r, theta_a, same=True)),
+        (np.pi, printed_in_plane(theta_i, theta_r, theta_a, same=False)),
+        (np.pi / 2, printed_perpendicular(theta_i, theta_r, theta_a)),
+    ):
+        arrays = (np.array(x) for x in (theta_i, theta_r, dphi, theta_a))
+        direct = isotropic_single_slope(*arrays).direct
+        assert direct == pytest.approx(expected, rel=1e-11, abs=1e-12)
+
+
+def test_the_isotropic_surface_is_reciprocal() -> None:
+    random = np.random.default_rng(6)
+    theta_i, theta_r, theta_a = random.uniform(0.01, 1.48, (3, 500))
+    dphi = random.uniform(0, 2 * np.pi, 500)
+    dphi[::5], theta_r[::7] = np.pi, theta_i[::7]
+    one = isotropic_single_slope(theta_i, theta_r, dphi, theta_a, 24)
+    two = isotropic_single_slope(theta_r, theta_i, dphi, theta_a, 24)
+    np.testing.assert_allclose(one.direct, two.direct, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(one.twice, two.twice, rtol=1e-9, atol=1e-11)
+
+
+def test_the_critical_angles_part_the_facets_as_in_table_2() -> None:
+    for theta_i, theta_r, theta_a, phi_r, _ in random_cavities(200, 7):
+        towards = Directions(*(np.array(x) for x in (theta_i, 0.0, theta_r, phi_r)))
+        slope, azimuth = np.array(theta_a), np.linspace(0, 2 * np.pi, 181)
+        for theta, phi, hidden in (
+            (theta_i, 0.0, shadowed_width(towards, slope, azimuth + np.pi)),
+            (theta_r, phi_r, masked_width(towards, slope, azimuth)),
+        ):
+            critical = critical_angle(np.array(theta), slope)
+            off = np.abs(np.angle(np.exp(1j * (azimuth - phi))))  # from the direction's azimuth
+            within, opposite = off < critical - 1e-9, off > np.pi - critical + 1e-9
+            between = (off > critical + 1e-9) & (off < np.pi - critical - 1e-9)
+            assert np.all((hidden[within] > 0) & (hidden[within] < 1))
+            assert np.all(hidden[between] == 0)
+            assert np.all(hidden[opposite] == 1)
+
+
+@pytest.mark.parametrize("which", ["theta_i", "theta_r", "theta_a"])
+@pytest.mark.parametrize("wrong", [-0.1, 1.6, math.nan])
+def test_angles_outside_the_hemisphere_are_refused(which: str, wrong: float) -> None:
+    angles = {"theta_i": np.array(0.5), "theta_r": np.array(0.6), "theta_a": np.array(0.7)}
+    theta_i, theta_r, theta_a = (angles | {which: np.array(wrong)}).values()
+    towards = Directions(theta_i, UP, theta_r, np.array(1.0))
+    words = f"{which} = {wrong:.12g} radians; allowed: 0 to pi/2"
+    with pytest.raises(ValueError, match=words):
+        isotropic_single_slope(theta_i, theta_r, np.array(1.0), theta_a)
+    for one_facet in (attenuation, unidirectional_single_slope):
+        with pytest.raises(ValueError, match=words):
+            one_facet(towards, theta_a, UP)
+
+
+def test_too_few_nodes_are_refused() -> None:
+    with pytest.raises(ValueError, match="nodes = 3; allowed: 4 or more"):
+        isotropic_single_slope(*(np.array(0.5) for _ in range(4)), nodes=3)

@@ -1,0 +1,220 @@
+"""Every fault of a line at every step of a move: the right value or a named error, one trigger."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeVar
+
+import pytest
+
+from drivers.lines.modbus_bus import ModbusBus, ModbusUnit
+from drivers.lines.modbus_client import BusSettings
+from drivers.lines.serial_line import NoReply, PortGone
+from drivers.stages.motor_stage import Stopped
+from drivers.stages.oriental import OrientalStage
+from drivers.stages.oriental_framing import value_of
+from instrument.errors import DeviceError
+from sim.emulated.wire import Fault
+from tests.support.stages.oriental_bench import (
+    KINDS,
+    SLOW,
+    SLOW_LIMITS,
+    STEPS_PER_DEG,
+    Bench,
+    bench,
+)
+
+pytestmark = pytest.mark.waits
+
+REPLY_S = 0.05
+FAULTS = {
+    "drop": Fault("drop"),
+    "delay": Fault("delay", 0.5 * REPLY_S),
+    "late": Fault("late", 1.5 * REPLY_S),
+    "later than the quiet": Fault("late", 2.4 * REPLY_S),
+    "much later": Fault("late", 4.0 * REPLY_S),
+    "garbage": Fault("garbage"),
+    "truncate": Fault("truncate"),
+    "nul": Fault("nul"),
+    "lose request": Fault("lose request"),
+    "unplug": Fault("unplug"),
+}
+TARGET = 8.0
+T = TypeVar("T")
+
+
+def _moved(at: Bench, stage: OrientalStage) -> float:
+    stage.start_move(TARGET)
+    return stage.wait()
+
+
+@pytest.mark.parametrize(("kind", "after"), [("pty", 0), ("tcp", 2)])
+@pytest.mark.parametrize("fault", FAULTS)
+def test_opening(kind: str, fault: str, after: int) -> None:
+    with bench(kind, reply_s=REPLY_S) as at:
+        at.wire.inject(*[None] * after, FAULTS[fault])
+        told = _outcome(fault, lambda: at.open().found)
+        assert told is None or "output 4020 hex, no alarm" in told
+        assert at.wire.pending == 0
+
+
+@pytest.mark.parametrize(("kind", "after"), [("pty", 0), ("tcp", 1)])
+@pytest.mark.parametrize("fault", FAULTS)
+def test_reading_the_status(kind: str, fault: str, after: int) -> None:
+    with bench(kind, reply_s=REPLY_S) as at:
+        stage = at.homed()
+        at.motor.move(TARGET)
+        _until(lambda: not at.motor.moving)
+        at.wire.inject(*[None] * after, FAULTS[fault])
+        for _ in range(3):
+            assert _outcome(fault, stage.position_deg) in (TARGET, None)
+        assert at.wire.pending == 0
+
+
+@pytest.mark.parametrize(("kind", "again"), [("pty", False), ("pty", True), ("tcp", False)])
+@pytest.mark.parametrize("fault", FAULTS)
+def test_writing_a_move(kind: str, fault: str, again: bool) -> None:
+    with bench(kind, reply_s=REPLY_S) as at:
+        stage, moves = at.homed(), 1
+        if again:  # the drive holds the same target already, and stands elsewhere
+            assert _moved(at, stage) == TARGET
+            at.motor.move(0.0)
+            _until(lambda: not at.motor.moving)
+            moves = 2
+        since = len(at.wire.seen)
+        at.wire.inject(None, None, None, FAULTS[fault])  # after status, position and READY
+        assert _outcome(fault, lambda: _moved(at, stage)) in (TARGET, None)
+        assert at.wire.pending == 0
+        assert b"\x10\x00\x58" in at.wire.seen[since + 3][1]  # it was the move that was hit
+        assert at.drive.triggers == moves
+        sent = len(at.sent(b"\x10\x00\x58", since))
+        assert sent == (2 if fault == "lose request" else 1)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_waiting(kind: str, fault: str) -> None:
+    with bench(kind, reply_s=REPLY_S) as at:
+        stage = at.homed()
+        stage.start_move(TARGET)
+        at.wire.inject(None, FAULTS[fault])
+        assert _outcome(fault, stage.wait) in (TARGET, None)
+        assert at.wire.pending == 0
+        assert at.drive.triggers == 1
+
+
+@pytest.mark.parametrize("kind", ["pty"])
+@pytest.mark.parametrize("fault", FAULTS)
+def test_homing(kind: str, fault: str) -> None:
+    with bench(kind, reply_s=REPLY_S) as at:
+        stage = at.open()
+        since = len(at.wire.seen)
+        at.wire.inject(None, None, None, None, FAULTS[fault])  # after the input word and READY
+        _outcome(fault, stage.home)
+        assert b"\x10\x00\x7d" in at.wire.seen[since + 4][1]
+        assert at.drive.homings == 1
+        if fault != "unplug":
+            assert stage.position_deg() == 0.0
+            assert at.motor.referenced
+
+
+@pytest.mark.parametrize(
+    ("kind", "fault"),
+    [("pty", name) for name in FAULTS] + [("tcp", name) for name in ("late", "nul", "unplug")],
+)
+def test_stopping(kind: str, fault: str) -> None:
+    with bench(kind, reply_s=2 * REPLY_S) as at:
+        stage = at.homed()
+        at.motor.move(-170.0)
+        at.wire.inject(replace(FAULTS[fault], seconds=2 * FAULTS[fault].seconds))
+        if fault == "much later":  # than all three tries
+            with pytest.raises(NoReply, match="not acknowledged: it may still move"):
+                stage.stop()
+        else:
+            _outcome(fault, stage.stop)
+        assert not at.motor.moving
+        if fault != "unplug":
+            here = at.motor.position_deg
+            assert stage.position_deg() == pytest.approx(here, abs=0.005)
+
+
+@pytest.mark.parametrize("kind", ["pty"])
+@pytest.mark.parametrize("first", ["late", "truncate", "lose request"])
+@pytest.mark.parametrize("second", ["drop", "later than the quiet"])
+def test_two_faults_in_a_row_at_a_move(kind: str, first: str, second: str) -> None:
+    with bench(kind, reply_s=REPLY_S) as at:
+        stage = at.homed()
+        at.wire.inject(None, None, None, FAULTS[first], FAULTS[second])
+        assert _outcome("", lambda: _moved(at, stage)) == TARGET
+        assert at.drive.triggers == 1
+
+
+def test_a_line_that_dies_at_a_move_says_that_it_may_move() -> None:
+    with bench("pty") as at:
+        stage = at.homed()
+        at.wire.inject(None, None, None, *[Fault("drop")] * 9)
+        begun_s = time.monotonic()
+        with pytest.raises(DeviceError, match=r"no answer within 0.25 s.*not known: it may move"):
+            stage.start_move(TARGET)
+        assert time.monotonic() - begun_s < 2.0
+        assert at.drive.triggers == 1
+
+
+def test_a_stop_forbids_the_second_try_of_a_lost_move() -> None:
+    with bench("pty") as at:
+        stage, told = at.homed(), []
+        since = len(at.wire.seen)
+        at.wire.inject(None, None, None, Fault("lose request"))
+
+        def move() -> None:
+            with pytest.raises(Stopped, match="stopped before it began to move"):
+                stage.start_move(TARGET)
+            told.append("stopped")
+
+        moving = threading.Thread(target=move)
+        moving.start()
+        _until(lambda: len(at.sent(b"\x10\x00\x58", since)) == 1)
+        stage.stop()
+        moving.join(timeout=5)
+        assert told == ["stopped"]
+        assert at.drive.triggers == 0
+
+
+@pytest.mark.parametrize("late", [1.5, 2.4, 4.0])
+def test_a_late_answer_is_never_taken_for_anothers(late: float) -> None:
+    """Command and feedback position are alike in shape: only waiting tells their answers apart."""
+    with bench("pty", SLOW, SLOW_LIMITS) as at:
+        stage = at.homed()
+        stage.start_move(90.0)
+        at.motor.hold()
+        held = round(at.motor.position_deg * STEPS_PER_DEG)
+        stage.close()
+        with ModbusBus("line", BusSettings(at.port, parity="N", reply_s=REPLY_S)) as bus:
+            unit = ModbusUnit(bus, "line", 1, 0x58, (6, 8, 10, 12, 14))
+            at.wire.inject(None, Fault("late", late * REPLY_S))
+            for _ in range(3):
+                assert value_of(unit.read(0xC6, 2)) == 9000
+                assert value_of(unit.read(0xCC, 2)) == held
+
+
+def _outcome(fault: str, action: Callable[[], T]) -> T | None:
+    """What came of it within 2 s; None stands for a named error, which only an unplug may be."""
+    begun_s = time.monotonic()
+    if fault == "unplug":
+        value = None
+        with pytest.raises(PortGone, match=r"theta_r: .*(is gone|cannot open)"):
+            action()
+    else:
+        value = action()
+    assert time.monotonic() - begun_s < 2.0
+    return value
+
+
+def _until(true: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + 5
+    while not true():
+        assert time.monotonic() < deadline_s
+        time.sleep(0.001)

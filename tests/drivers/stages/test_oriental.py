@@ -1,0 +1,355 @@
+"""The AZ drive's driver: literal bytes, and how the stage behaves over both lines."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import sim.emulated.oriental_controller
+from drivers.lines.modbus_bus import ModbusBus
+from drivers.lines.serial_line import NoReply, PortGone
+from drivers.stages.motor_stage import Stopped
+from drivers.stages.oriental import OrientalSettings, OrientalStage
+from instrument.clock import SystemClock
+from instrument.errors import DeviceError, InputError
+from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway
+from sim.emulated.motor import Motor
+from sim.emulated.oriental_controller import OrientalController, crc
+from sim.emulated.wire import Fault, PtyWire, TcpWire
+from tests.support.stages.oriental_bench import (
+    FAST,
+    KINDS,
+    LIMITS,
+    SLOW,
+    SLOW_LIMITS,
+    STEPS_PER_DEG,
+    Bench,
+    bench,
+)
+
+pytestmark = pytest.mark.waits
+
+STOP_TCP, STOP_RTU = bytes.fromhex("06 007D 0020"), bytes.fromhex("01 06 007D 0020")
+MOVE_WRITE = bytes.fromhex("10 0058 0010 20")
+
+
+@pytest.fixture(params=KINDS)
+def at(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    with bench(request.param, reply_s=0.1) as made:
+        yield made
+
+
+@pytest.fixture(params=KINDS)
+def slow_at(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    with bench(request.param, SLOW, SLOW_LIMITS) as made:
+        yield made
+
+
+def test_who_answers_is_said(at: Bench) -> None:
+    stage = at.open()
+    assert stage.identity() == "Oriental Motor AZ drive, by its registers, unit 1"
+    assert "output 4020 hex, no alarm" in stage.found
+
+
+def test_it_homes_moves_and_says_where_it_is(at: Bench) -> None:
+    stage = at.homed()
+    assert at.drive.homings == 1
+    for count, angle in enumerate((12.34, -56.78, 169.994, 0.0), start=1):
+        stage.start_move(angle)
+        arrived = stage.wait()
+        assert arrived == pytest.approx(angle, abs=0.5 / STEPS_PER_DEG + 1e-9)
+        assert arrived == pytest.approx(at.motor.position_deg, abs=0.5 / STEPS_PER_DEG)
+        assert at.drive.triggers == count
+    stage.start_move(0.0)  # where it is
+    assert stage.wait() == 0.0
+
+
+def test_nothing_is_sent_for_a_move_past_a_limit(at: Bench) -> None:
+    stage = at.homed()
+    seen = list(at.wire.seen)
+    for angle in (170.01, -170.01, float("nan")):
+        with pytest.raises(DeviceError, match="its limits are -170 to 170 deg"):
+            stage.start_move(angle)
+    assert at.wire.seen == seen
+
+
+def test_nothing_moves_before_homing(at: Bench) -> None:
+    stage = at.open()
+    with pytest.raises(DeviceError, match="not homed"):
+        stage.start_move(1.0)
+    assert not at.sent(MOVE_WRITE)
+
+
+def test_the_position_is_the_feedback_not_what_was_commanded(slow_at: Bench) -> None:
+    stage = slow_at.homed()
+    stage.start_move(90.0)
+    assert stage.position_deg() < 45.0
+    assert stage.position_deg() == pytest.approx(slow_at.motor.position_deg, abs=1.0)
+
+
+def test_a_stop_from_another_thread_ends_the_wait_and_can_be_repeated(slow_at: Bench) -> None:
+    stage, ended = slow_at.homed(), []
+    stage.start_move(90.0)
+
+    def wait() -> None:
+        with pytest.raises(Stopped) as stopped:
+            stage.wait()
+        ended.append(stopped.value)
+
+    waiting = threading.Thread(target=wait)
+    waiting.start()
+    since, before_s = len(slow_at.wire.seen), time.monotonic()
+    stage.stop()
+    assert slow_at.sent(STOP_TCP, since)[0] - before_s < 0.3
+    stage.stop()
+    waiting.join(timeout=5)
+    assert len(ended) == 1
+    assert not slow_at.motor.moving
+    stage.start_move(stage.position_deg() + 0.1)  # the STOP bit is taken back
+    stage.wait()
+    assert slow_at.drive.triggers == 2
+
+
+def test_a_stop_waits_for_one_lost_answer_at_most(slow_at: Bench) -> None:
+    stage = slow_at.homed()
+    stage.start_move(90.0)
+    since = len(slow_at.wire.seen)
+    slow_at.wire.inject(Fault("drop"), Fault("drop"))
+    reading = threading.Thread(target=stage.position_deg)
+    reading.start()
+    _until(lambda: len(slow_at.wire.seen) > since)
+    before_s = time.monotonic()
+    stage.stop()  # its own first answer is dropped too
+    assert slow_at.sent(STOP_TCP, since)[0] - before_s < 0.3
+    assert len(slow_at.sent(STOP_TCP, since)) == 2
+    assert not slow_at.motor.moving
+    reading.join(timeout=5)
+
+
+def test_a_stop_does_not_wait_until_the_line_is_quiet(slow_at: Bench) -> None:
+    stage = slow_at.homed()
+    stage.start_move(90.0)
+    slow_at.wire.inject(Fault("drop"))
+    reading = threading.Thread(target=stage.position_deg)
+    begun_s = time.monotonic()
+    reading.start()
+    _until(lambda: time.monotonic() - begun_s > 0.3)  # past the time-out: it listens for quiet
+    since, before_s = len(slow_at.wire.seen), time.monotonic()
+    stage.stop()
+    assert slow_at.sent(STOP_TCP, since)[0] - before_s < 0.1
+    reading.join(timeout=5)
+
+
+def test_a_stop_left_in_the_drive_is_taken_back_before_the_first_motion(at: Bench) -> None:
+    at.drive.serve(STOP_TCP)
+    stage = at.homed()
+    stage.start_move(1.0)
+    assert stage.wait() == 1.0
+
+
+def test_an_alarm_ends_the_wait_and_forbids_moves(slow_at: Bench) -> None:
+    stage = slow_at.homed()
+    stage.start_move(90.0)
+    slow_at.motor.fail("66")
+    with pytest.raises(DeviceError, match=r"theta_r: alarm 66h \(hardware overtravel\)"):
+        stage.wait()
+    since = len(slow_at.wire.seen)
+    for motion in (lambda: stage.start_move(1.0), stage.home):
+        with pytest.raises(DeviceError, match="alarm 66h"):
+            motion()
+    assert not slow_at.sent(MOVE_WRITE, since)
+    assert (slow_at.drive.triggers, slow_at.drive.homings) == (1, 1)
+
+
+def test_a_target_beyond_the_drives_own_limits_is_its_alarm() -> None:
+    with bench("pty", replace(FAST, max_deg=90.0)) as at:
+        stage = at.homed()
+        stage.start_move(100.0)
+        with pytest.raises(DeviceError, match="alarm 67h"):
+            stage.wait()
+        assert at.motor.position_deg == 0.0
+
+
+def test_a_held_stage_is_noticed() -> None:
+    with bench("pty", SLOW, SLOW_LIMITS) as at:
+        stage = at.homed()
+        stage.start_move(30.0)
+        _until(lambda: at.motor.position_deg > 0.5)
+        at.motor.hold()
+        with pytest.raises(DeviceError, match="stalled"):
+            stage.wait()
+        assert not at.motor.moving
+
+
+def test_a_held_motor_is_the_drives_overload(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sim.emulated.oriental_controller, "OVERLOAD_S", 0.2)
+    with bench("pty", SLOW, SLOW_LIMITS) as at:
+        stage = at.homed()
+        stage.start_move(30.0)
+        at.motor.hold()
+        with pytest.raises(DeviceError, match=r"alarm 30h \(overload\)"):
+            stage.wait()
+
+
+def test_a_reference_that_is_not_found_is_an_error_and_a_stop() -> None:
+    with bench("pty", FAST, replace(LIMITS, homing_s=0.2)) as at:
+        at.motor.refuses_home = True
+        stage = at.open()
+        with pytest.raises(DeviceError, match=r"not found within 0.2 s"):
+            stage.home()
+        assert at.sent(STOP_RTU)
+        assert not at.motor.homing
+
+
+def test_a_drive_that_is_not_ready_takes_no_move(at: Bench) -> None:
+    stage = at.homed()
+    at.drive._free = True  # its FREE input: the motor is without current
+    with pytest.raises(DeviceError, match=r"not ready to move .* STOP and FREE"):
+        stage.start_move(1.0)
+    assert at.drive.triggers == 0
+
+
+def test_a_stage_on_its_way_is_left_alone(at: Bench) -> None:
+    stage = at.homed()
+    at.motor.move(170.0)
+    at.motor.hold()
+    for command in (lambda: stage.start_move(1.0), stage.home):
+        with pytest.raises(DeviceError, match=r"is on its way already, .* or stop it first"):
+            command()
+    assert at.drive.triggers == 0
+    assert at.motor.moving
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_several_drives_share_one_line(kind: str) -> None:
+    drives = [OrientalController(Motor(FAST, SystemClock()), unit, 100.0) for unit in (1, 2)]
+    with PtyWire(drives) if kind == "pty" else TcpWire([ModbusTcpGateway(drives)]) as wire:
+        port = wire.port if isinstance(wire, PtyWire) else f"tcp://localhost:{wire.port}"
+        one, two = (OrientalSettings(port, 100.0, LIMITS, parity="N", unit=unit) for unit in (1, 2))
+        with ModbusBus("line", one.bus) as bus:
+            stages = [OrientalStage(f"axis {s.unit}", s, SystemClock(), bus) for s in (one, two)]
+            for stage in stages:
+                stage.home()
+            wire.inject(Fault("late", 0.16))
+            stages[0].start_move(30.0)
+            stages[1].start_move(-20.0)
+            assert [stage.wait() for stage in stages] == [30.0, -20.0]
+            stages[0].close()
+            assert stages[1].position_deg() == -20.0  # the line is the bus's, not the stage's
+    assert [drive.triggers for drive in drives] == [1, 1]
+
+
+class Says:
+    """Answers every request alike."""
+
+    def __init__(self, answer: str, check: bool = True) -> None:
+        data = bytes.fromhex(answer)
+        self._answer = data + crc(data) if check and data else data
+
+    def answer(self, _data: bytes) -> bytes:
+        return self._answer
+
+
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [
+        ("01 83 02", r"register 00(58|7E) hex at .*: exception 02 \(illegal data address\)"),
+        ("01 83 63", r"exception 63 \(not known here\)"),
+        ("01 83 0B", "the device behind the gateway did not answer"),
+        ("", "no answer within 0.05 s"),
+        ("02 03 04 00000000", "no whole answer"),  # another unit's
+        ("01 10 0058 0010", "an answer to function 16"),
+        ("01 03 04 00000000", "2 registers instead of"),
+        ("01 03 05 0000000000", "no whole answer|registers instead of"),
+        ("01 7F 00 00", "no whole answer|an answer to function"),
+    ],
+)
+def test_what_does_not_answer_like_a_drive_is_refused(answer: str, says: str) -> None:
+    stage_settings = OrientalSettings("", 100.0, LIMITS, parity="N", reply_s=0.05)
+    with PtyWire([Says(answer)]) as wire, pytest.raises(DeviceError, match=says):
+        OrientalStage("theta_r", replace(stage_settings, port=wire.port), SystemClock())
+
+
+@settings(max_examples=15)
+@given(st.binary(min_size=1, max_size=40))
+def test_noise_instead_of_an_answer_is_an_error_that_is_ours(noise: bytes) -> None:
+    stage_settings = OrientalSettings("", 100.0, LIMITS, parity="N", reply_s=0.004)
+    with PtyWire([Says(noise.hex(), check=False)]) as wire, pytest.raises(DeviceError):
+        OrientalStage("theta_r", replace(stage_settings, port=wire.port), SystemClock())
+
+
+def test_a_drive_with_other_ranges_is_none() -> None:
+    with bench("pty") as at:
+        at.drive.serve(bytes.fromhex("10 0058 0002 04 0000 03E7"))
+        with pytest.raises(DeviceError, match="is no Oriental Motor AZ drive: data number 999"):
+            at.open()
+
+
+def test_silence_is_said_within_two_seconds(at: Bench) -> None:
+    begun_s = time.monotonic()
+    with pytest.raises(NoReply, match=r"no answer|did not answer"):
+        at.open(unit=7)
+    assert time.monotonic() - begun_s < 2.0
+
+
+@pytest.mark.parametrize(
+    ("port", "says"),
+    [("/dev/none", "cannot open /dev/none"), ("tcp://localhost:1", "cannot open tcp://localhost")],
+)
+def test_a_port_that_is_not_there_is_named(port: str, says: str) -> None:
+    with pytest.raises(PortGone, match=says):
+        OrientalStage("theta_r", OrientalSettings(port, 100.0, LIMITS), SystemClock())
+
+
+@pytest.mark.parametrize("port", ["tcp://", "tcp://host:high"])
+def test_an_address_that_is_none_is_refused(port: str) -> None:
+    with pytest.raises(InputError, match=port):
+        OrientalStage("theta_r", OrientalSettings(port, 100.0, LIMITS), SystemClock())
+
+
+def test_a_parity_that_the_port_refuses_is_said() -> None:
+    stage_settings = OrientalSettings("", 100.0, LIMITS, parity="X")  # type: ignore[arg-type]  # wrong
+    with PtyWire([]) as wire, pytest.raises(PortGone, match=r"'X': look at .*, at the parity"):
+        OrientalStage("theta_r", replace(stage_settings, port=wire.port), SystemClock())
+
+
+def test_a_closed_line_stays_closed(at: Bench) -> None:
+    stage = at.homed()
+    stage.close()
+    stage.close()
+    for action in (stage.status, stage.stop):
+        with pytest.raises(PortGone, match="it was closed"):
+            action()
+
+
+def test_a_gateway_that_has_hung_up_is_called_again() -> None:
+    with bench("tcp") as at:
+        stage = at.homed()
+        peer = at.wire._peer  # type: ignore[union-attr]  # a TcpWire's
+        assert peer is not None
+        peer.shutdown(2)
+        assert stage.position_deg() == 0.0
+
+
+def test_a_point_costs_little(at: Bench) -> None:
+    stage, spent = at.homed(), []
+    for _ in range(9):
+        since, begun_s = len(at.wire.seen), time.monotonic()
+        stage.start_move(0.0)
+        assert stage.wait() == 0.0
+        spent.append(time.monotonic() - begun_s)
+        assert len(at.wire.seen) - since <= 6
+    assert min(spent) < 0.04
+
+
+def _until(true: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + 5
+    while not true():
+        assert time.monotonic() < deadline_s
+        time.sleep(0.001)

@@ -1,0 +1,90 @@
+"""Which frames count: no frame that began before the call, none with the old exposure."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.v4l2.frame_filter import Gate
+
+exposures = st.floats(1e-4, 5.0)
+
+
+def sensor(
+    changes: list[tuple[float, float]], overhead_s: float, phase_s: float, delay_frames: int
+) -> list[tuple[float, float]]:
+    """Start and exposure of the frames of a free-running sensor.
+
+    `changes`: when which exposure was set. It reaches the sensor `delay_frames` frames late.
+    """
+    frames: list[tuple[float, float]] = []
+    start_s, pipeline = phase_s, [changes[0][1]] * delay_frames
+    while len(frames) < 40:
+        pipeline.append([exposure for at_s, exposure in changes if at_s <= start_s][-1])
+        exposure_s = pipeline.pop(0)
+        frames.append((start_s, exposure_s))
+        start_s += exposure_s + overhead_s
+    return frames
+
+
+@given(
+    old_s=exposures,
+    new_s=exposures,
+    overhead_s=st.floats(1e-3, 0.2),
+    changed_s=st.floats(0.0, 8.0),
+    waited_s=st.floats(0.0, 3.0),
+    delay_frames=st.integers(0, 3),
+    stamp_at_end=st.booleans(),
+)
+def test_what_counts_began_after_the_call_at_the_new_exposure(
+    old_s: float,
+    new_s: float,
+    overhead_s: float,
+    changed_s: float,
+    waited_s: float,
+    delay_frames: int,
+    stamp_at_end: bool,
+) -> None:
+    gate = Gate(old_s, overhead_s, delay_frames, None)
+    frames = sensor([(-9.0, old_s), (changed_s, new_s)], overhead_s, -3.0, delay_frames)
+    called_s = changed_s + waited_s
+    gate.exposure_changed(changed_s, new_s)
+    gate.call(called_s)
+    longest_s = gate.longest_exposure_s
+    assert longest_s == max(old_s, new_s)
+    for start_s, exposure_s in frames:
+        stamp_s = start_s + (exposure_s + overhead_s if stamp_at_end else 0.0)
+        if gate.admits(stamp_s):
+            assert start_s >= called_s - 1e-9
+            assert exposure_s == new_s
+            assert gate.longest_exposure_s == new_s
+
+
+def test_frames_are_not_thrown_away_without_need() -> None:
+    """A steady camera, stamps at the end: at most two frames beyond the first that began later."""
+    gate = Gate(0.01, 0.03, 2, None)
+    gate.call(0.0)
+    stamps = [gate.admits(0.03 * n + 0.005) for n in range(10)]
+    assert stamps.index(True) <= 4 + 0
+    gate.call(1.0)
+    assert [gate.admits(1.0 + 0.03 * n) for n in range(4)] == [False, False, True, True]
+
+
+def test_an_unchanged_exposure_costs_no_frames() -> None:
+    gate = Gate(0.01, 0.005, 0, None)
+    gate.call(1.0)
+    assert not gate.admits(1.014)
+    assert gate.admits(1.016)
+
+
+@pytest.mark.parametrize("late", [0, 2])
+def test_without_a_clock_frames_are_counted(late: int) -> None:
+    gate = Gate(0.01, 0.005, late, 6)
+    gate.call(0.0)
+    assert [gate.admits(0.0) for _ in range(10)].index(True) == 6 + late
+    gate.call(0.0)
+    assert [gate.admits(0.0) for _ in range(10)].index(True) == 6
+    gate.exposure_changed(0.0, 0.02)
+    gate.call(0.0)
+    assert [gate.admits(0.0) for _ in range(10)].index(True) == 6 + late

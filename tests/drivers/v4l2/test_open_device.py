@@ -1,0 +1,149 @@
+"""Opening a V4L2 camera: everything is read back, and what went wrong is said with values."""
+
+from __future__ import annotations
+
+import errno
+import re
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from drivers.v4l2 import ioctl as v4l2
+from instrument.errors import DeviceError
+from sim.emulated.v4l2.device import Faults
+from tests.support.v4l2.remote_camera import (
+    DEVICE,
+    SETTINGS,
+    Bench,
+    RemoteCamera,
+    served,
+)
+
+WHO = re.escape(f"camera Emulated camera ({DEVICE})")
+FOUND_WITHIN_S = 2.0  # beyond the exposure
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def fault(**values: Any) -> Callable[[Faults], None]:
+    def apply(faults: Faults) -> None:
+        for name, value in values.items():
+            setattr(faults, name, value)
+
+    return apply
+
+
+OPENING = [
+    (
+        fault(substitute_format="GREY"),
+        {},
+        "format Y16 asked for, the camera took GREY; it offers GREY, Y10, Y16, YUYV",
+    ),
+    (
+        fault(substitute_size=(640, 480)),
+        {},
+        "size 64 x 48 pixels asked for, the camera took 640 x 480; it offers 640 x 480, 512 x 480",
+    ),
+    (
+        fault(clamped_exposure=50),
+        {"min_exposure_s": 0.01},
+        "exposure 0.01 s asked for, the camera took 0.005 s",
+    ),
+    (
+        fault(),
+        {"max_exposure_s": 20.0},
+        "exposure 20 s asked for; the camera allows 0.0001 s to 10 s",
+    ),
+    (fault(), {"gain": 485}, "gain 485 asked for; the camera allows 0 to 480 in steps of 10"),
+    (fault(), {"gain": 105}, "gain 105 asked for, the camera took 100; .* in steps of 10"),
+    (
+        fault(stuck_controls={v4l2.EXPOSURE_AUTO}),
+        {},
+        "manual exposure, which is mode 1 asked for, the camera took 3",
+    ),
+    (
+        fault(stuck_controls={v4l2.AUTOGAIN}),
+        {},
+        "automatic gain 0 asked for, the camera took 1",
+    ),
+    (
+        fault(stuck_controls={v4l2.AUTO_WHITE_BALANCE}),
+        {},
+        "automatic white balance 0 asked for, the camera took 1",
+    ),
+    (fault(stuck_controls={v4l2.GAMMA}), {}, "gamma 1 asked for, the camera took 2.2"),
+    (
+        fault(refused_controls={v4l2.GAIN}),
+        {},
+        r"gain 100 asked for; the camera refused it \(Permission denied\)",
+    ),
+    (fault(gives_no_buffers=True), {}, "is there, but OpenCV cannot open it: no buffers"),
+    (
+        lambda faults: faults.fail("STREAMON", errno.ENOSPC),
+        {},
+        "the stream could not be started.*USB hub",
+    ),
+    (
+        lambda faults: faults.fail("open", errno.EACCES),
+        {},
+        r"cannot be opened \(Permission denied\)",
+    ),
+    (fault(frozen=True), {}, "no frame for .* the stream stands still.*USB cable"),
+]
+
+
+@pytest.mark.parametrize(("spoil", "changes", "message"), OPENING)
+def test_an_opening_that_went_wrong_says_what_was_asked_and_given(
+    remote: RemoteCamera,
+    bench: Bench,
+    spoil: Callable[[Faults], None],
+    changes: dict[str, Any],
+    message: str,
+) -> None:
+    with served(remote, bench) as camera:
+        spoil(camera.faults)
+        with pytest.raises(DeviceError, match=f"^camera .*{re.escape(DEVICE)}.?: {message}"):
+            remote.ask("open", replace(SETTINGS, **changes))
+
+
+def test_a_gain_that_the_camera_does_not_have(remote: RemoteCamera, bench: Bench) -> None:
+    with (
+        served(remote, bench, without_controls=frozenset({v4l2.GAIN})),
+        pytest.raises(DeviceError, match=f"{WHO}: gain 100 asked for, but the camera has no such"),
+    ):
+        remote.ask("open", SETTINGS)
+
+
+def test_padded_rows_are_refused(remote: RemoteCamera, bench: Bench) -> None:
+    with (
+        served(remote, bench, row_padding_bytes=32),
+        pytest.raises(DeviceError, match="a row has 160 bytes, 128 of them pixels"),
+    ):
+        remote.ask("open", SETTINGS)
+
+
+def test_a_rate_that_the_camera_does_not_reach(remote: RemoteCamera, bench: Bench) -> None:
+    with served(remote, bench):
+        remote.ask("open", replace(SETTINGS, frames_per_s=200))
+        with pytest.raises(DeviceError, match="400 frames a second asked for, the camera took 200"):
+            remote.ask("open", replace(SETTINGS, frames_per_s=400))
+
+
+def test_a_camera_that_another_program_uses(remote: RemoteCamera, bench: Bench) -> None:
+    with served(remote, bench) as camera:
+        camera.streamer = "another program"
+        with pytest.raises(DeviceError, match=f"{WHO}: .*whether another program uses the camera"):
+            remote.ask("open", SETTINGS)
+
+
+def test_no_camera_at_all(remote: RemoteCamera) -> None:
+    start_s = time.monotonic()
+    with pytest.raises(DeviceError, match=f"camera {DEVICE}: cannot be opened .*No such file"):
+        remote.ask("open", SETTINGS)
+    assert time.monotonic() - start_s < FOUND_WITHIN_S

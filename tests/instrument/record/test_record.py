@@ -1,0 +1,126 @@
+"""The run record: on disk at once, readable by others, refused where it is not ours."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from instrument.errors import InputError
+from instrument.record.network_share import network_share
+from instrument.record.reading import Preview, Reading
+from instrument.record.record import FILE_NAME, Record
+
+
+def reading(step: int = 0, **changes: object) -> Reading:
+    values: dict[str, object] = {
+        "step": step, "kind": "point", "surface": "sample", "theta_i_deg": 30.0, "dphi_deg": 0.0,
+        "theta_r_deg": -20.0, "lamp_setting": 0, "block": 0, "signal_dn": 2000.5,
+        "u_noise_dn": 0.1, "u_quantisation_dn": 0.01, "u_dark_dn": 0.02, "u_placement_dn": -0.4,
+        "u_texture_dn": 0.1,
+        "exposure_s": 0.032, "frames": 4, "window_pixels": 31000.25, "saturated_pixels": 0,
+        "peak_dn": 2500.0, "time_s": 12.5, "free_s": 12.5, "flags": "",
+        "time_utc": "2026-01-01T00:00:00+00:00",
+    }  # fmt: skip
+    return Reading(**{**values, **changes})  # type: ignore[arg-type]  # a test's shorthand
+
+
+def test_what_was_added_is_read_back_as_it_was(tmp_path: Path) -> None:
+    rows = [reading(0), reading(1, kind="tile", flags="saturated")]
+    picture = Preview(1, "a view", b"\x89PNG", [[0.0, 1.5], [2.0, 3.0]])
+    with Record.create(tmp_path / "run", {"protocol": "text"}) as record:
+        record.add_device("camera", "somebody")
+        record.add_dark("2026", 0.032, 8, 64.0, 1.1)
+        record.add_event("2026", "operator", "done")
+        record.add_reading(rows[0])
+        record.add_reading(rows[1], picture)
+    with Record.open(tmp_path / "run") as record:
+        assert record.readings() == rows
+        assert record.previews() == [picture]
+        assert record.devices() == {"camera": "somebody"}
+        assert record.darks() == [(0.032, 8, 64.0, 1.1)]
+        assert list(record.events()) == [("2026", "operator", "done")]
+        assert record.meta("protocol") == "text"
+        assert record.meta("nothing") is None
+
+
+def test_another_tool_reads_it_while_the_scan_runs(tmp_path: Path) -> None:
+    with Record.create(tmp_path / "run", {}) as record:
+        record.add_reading(reading())
+        other = sqlite3.connect(f"file:{tmp_path / 'run' / FILE_NAME}?mode=ro", uri=True)
+        assert other.execute("SELECT theta_r_deg FROM reading").fetchall() == [(-20.0,)]
+        assert other.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+        other.close()
+        assert record.meta("schema_version") == "3"
+
+
+def test_a_value_that_could_not_be_measured_stays_unknown(tmp_path: Path) -> None:
+    with Record.create(tmp_path / "run", {}) as record:
+        record.add_reading(reading(signal_dn=float("nan")))
+        assert record.readings()[0].signal_dn != record.readings()[0].signal_dn
+
+
+def test_the_same_step_is_never_accepted_twice(tmp_path: Path) -> None:
+    with Record.create(tmp_path / "run", {}) as record:
+        record.add_reading(reading())
+        with pytest.raises(sqlite3.IntegrityError):
+            record.add_reading(reading())
+
+
+def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match="must be absent or an empty folder"):
+        Record.create(tmp_path, {})
+    assert [p.name for p in tmp_path.iterdir()] == ["notes.txt"]
+
+
+def test_no_record_a_foreign_file_and_another_version_are_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no record\.sqlite there"):
+        Record.open(tmp_path)
+    (tmp_path / FILE_NAME).write_text("not a database, but long enough to look like one" * 40)
+    with pytest.raises(InputError, match="not a record of this program"):
+        Record.open(tmp_path)
+    with Record.create(tmp_path / "run", {}) as record:
+        record.set_meta("schema_version", "99")
+    with pytest.raises(InputError, match="schema version 99; this program reads 3"):
+        Record.open(tmp_path / "run")
+
+
+def test_one_process_at_a_time_scans_into_a_run(tmp_path: Path) -> None:
+    with Record.create(tmp_path / "run", {}) as record:
+        with record.claimed(), Record.open(tmp_path / "run") as other:
+            words = rf"process {os.getpid()} is scanning into this run"
+            with pytest.raises(InputError, match=words), other.claimed():
+                raise AssertionError("claimed twice")
+        with record.claimed() as again:
+            assert again is None
+
+
+MOUNTS = r"""22 1 8:1 / / rw,relatime shared:1 - ext4 /dev/sda1 rw
+30 22 0:50 / /lab rw,relatime shared:2 - nfs4 server:/lab rw
+31 30 8:2 / /lab/local rw - xfs /dev/sdb1 rw
+32 22 0:51 / /with\040blank rw - cifs //server/share rw
+33 22 0:52 / /far rw - fuse.sshfs me@server: rw
+broken line
+"""
+
+
+@pytest.mark.parametrize(
+    ("folder", "kind"),
+    [("/home/run", None), ("/lab/run", "nfs4"), ("/lab/local/run", None), ("/laboratory", None),
+     ("/with blank/a/b", "cifs"), ("/far", "fuse.sshfs")],
+)  # fmt: skip
+def test_a_network_share_is_told_by_its_mount(tmp_path: Path, folder: str, kind: str) -> None:
+    (tmp_path / "mounts").write_text(MOUNTS)
+    assert network_share(Path(folder), tmp_path / "mounts") == kind
+    assert network_share(Path(folder), tmp_path / "none") is None
+
+
+def test_no_record_on_a_network_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("instrument.record.record.network_share", lambda _: "nfs4")
+    for way in (lambda: Record.create(tmp_path / "run", {}), lambda: Record.open(tmp_path)):
+        with pytest.raises(InputError, match=r"network share \(nfs4\).*a folder on a local disk"):
+            way()
+    assert not (tmp_path / "run").exists()

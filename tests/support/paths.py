@@ -1,0 +1,8 @@
+"""Folders that tests read: the project's own, and the shipped configuration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+CONFIGS = ROOT / "configs"

@@ -1,0 +1,66 @@
+"""A seeded scan with known truth and known errors, for the tests of fit and choice."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analysis.data.acceptance import Acceptance, averaged_brdf
+from analysis.data.measurements import Measurements, SharedError, same_setting
+from analysis.models import MODELS
+from instrument.geometry import FloatArray, Geometry
+
+# Oren and Nayar 1995, section 5: incidence 30, 45 and 60 degrees, .003 sr and .0009 sr, 6 ft.
+RIG = Acceptance(1828.8, 1500.0, 0.003, 0.0009, 20.0, 20.0)
+# White plaster, painted sandpaper, white sand; foam, towel, wood shavings (ks: theirs times 4).
+DIFFUSE = [(30.0, 0.9), (40.0, 0.8), (35.0, 0.8)]
+GLOSSY = [(20.0, 0.8, 0.076), (42.0, 0.75, 0.34), (26.0, 0.70, 0.172)]
+
+
+def scan_angles() -> tuple[FloatArray, FloatArray, FloatArray]:
+    """3 incidences x 33 view angles, less those that the camera would keep from the lamp."""
+    theta_i = np.repeat([30.0, 45.0, 60.0], 33)
+    theta_r = np.tile(np.linspace(-80, 80, 33), 3)
+    kept = np.abs(theta_i - theta_r) >= 3
+    return theta_i[kept], theta_r[kept], np.zeros(int(kept.sum()))
+
+
+def scan(
+    name: str,
+    seed: int,
+    *,
+    u_relative: float = 5e-4,
+    u_tile: float = 0.005,
+    u_deg: float = 0.02,
+    acceptance: Acceptance | None = None,
+    **truth: float,
+) -> Measurements:
+    """What a rig with those uncertainties would measure of a sample that obeys the model."""
+    rng = np.random.default_rng(seed)
+    theta_i, theta_r, dphi = scan_angles()
+    setting = same_setting(theta_i, dphi)
+    true_i = theta_i + u_deg * rng.normal(size=3)[setting]
+    # A stage repeats its error at every return to an angle.
+    view = np.unique(theta_r, return_inverse=True)[1]
+    true_r = theta_r + u_deg * rng.normal(size=int(view.max()) + 1)[view]
+    true_phi = dphi + u_deg * rng.normal(size=3)[setting]
+
+    def sample(geometry: Geometry) -> FloatArray:
+        return MODELS[name].brdf(geometry, **truth)
+
+    if acceptance is None:
+        value = sample(Geometry.from_degrees(theta_i=true_i, theta_r=true_r, dphi=true_phi))
+    else:
+        value = averaged_brdf(sample, true_i, true_r, true_phi, acceptance, 3)
+    noisy = value * (1 + u_tile * rng.normal()) * (1 + u_relative * rng.normal(size=value.size))
+    return Measurements(
+        theta_i, theta_r, dphi, noisy, u_relative * np.abs(value),
+        lamp_setting=setting, shared=(SharedError.of_all("white tile", u_tile, value.size),),
+        u_theta_i_deg=u_deg, u_theta_r_deg=u_deg, u_dphi_deg=u_deg,
+    )  # fmt: skip
+
+
+def test_the_scan_is_what_it_says() -> None:
+    m = scan("lambert", 1, u_relative=1e-12, u_tile=0.0, u_deg=0.0, albedo=0.5)
+    assert m.size == 96  # 99 less the one next to the lamp at each incidence
+    np.testing.assert_allclose(m.brdf, 0.5 / np.pi, rtol=1e-10)
+    assert np.unique(m.lamp_setting).size == 3

@@ -1,0 +1,206 @@
+"""Kills scans with SIGKILL and looks at what they leave; a process of its own, so that it can fork.
+
+`FOLDER KILLS SEED` kills at random moments, `FOLDER entries STRIDE` before every STRIDE-th thing
+that the scan does to its files (under the write recorder); both print what came of it as JSON.
+`FOLDER record LOG` kills nothing: it has the recorder write down a scan that keeps its frames, is
+stopped once, and goes on.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import random
+import shutil
+import signal
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from acquisition.engine.engine import Engine
+from acquisition.engine.resume import SoFar
+from acquisition.plan.plan import Plan, Step, make_plan
+from acquisition.results.reduction import reduce
+from acquisition.rig import open_devices
+from instrument.config.load import Loaded
+from instrument.errors import InputError
+from instrument.record.record import Record
+from tests.support.scans import changed, small_scan, undated
+
+
+@dataclass
+class Outcome:
+    """Counted over all kills; all but the first three must stay 0."""
+
+    kills: int = 0
+    killed_twice: int = 0
+    accepted_before: int = 0
+    lost: int = 0
+    duplicated: int = 0
+    not_the_plan_s: int = 0
+    unequal: int = 0
+    results_unequal: int = 0
+    jumped: int = 0
+
+
+def scan(folder: Path, loaded: Loaded, plan: Plan, told: Callable[[int], None]) -> None:
+    """Begin the scan in that folder, or go on with it; `told` hears of each accepted step."""
+
+    def on_step(step: Step) -> None:
+        told(step.index)
+
+    with opened(folder) as record, record.claimed():
+        before = SoFar(tuple(record.readings()), tuple(record.checks()))
+        if not before.missing(plan):
+            return
+        engine = Engine(loaded.protocol, loaded.rig, open_devices(loaded), record, on_step)
+        engine.run(plan, before if before.readings else None)
+
+
+def opened(folder: Path) -> Record:
+    """The run's record; one that had not begun is begun anew, as its message says."""
+    if folder.exists():
+        try:
+            return Record.open(folder)
+        except InputError as error:
+            if "nothing was measured" not in str(error) and "no record.sqlite" not in str(error):
+                raise
+        shutil.rmtree(folder)
+    return Record.create(folder, {})
+
+
+class Killer:
+    """Forks scans and kills them."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._loaded = small_scan()
+        self._plan = make_plan(self._loaded)
+        scan(folder / "whole", self._loaded, self._plan, lambda _: None)  # warms everything up
+        with Record.open(folder / "whole") as record:
+            self._whole = undated(record.readings())
+            self._brdf = self._reduced(record)
+        self.outcome = Outcome()
+
+    def _reduced(self, record: Record) -> list[float]:
+        reduced = reduce(record.readings(), self._loaded.protocol, record.checks())
+        return [float(value) for value in reduced.brdf]
+
+    def killed(self, run: Path, waits: Callable[[int], None], at: int = -1) -> set[int]:
+        """Start or resume in a fork, kill it once `waits` returns; the steps it told of."""
+        ours, theirs = os.pipe()
+        child = os.fork()
+        if child == 0:
+            os.close(ours)
+            self._be_killed(run, theirs, at)
+        os.close(theirs)
+        waits(child)
+        with os.fdopen(ours, "rb") as told:
+            return set(told.read())
+
+    def _be_killed(self, run: Path, told: int, at: int) -> None:
+        if at >= 0:
+            recorder = ctypes.CDLL(None)
+            recorder.recorder_begin(b"/dev/null")
+            recorder.recorder_kill_at(at)
+        try:
+            scan(run, self._loaded, self._plan, lambda step: os.write(told, bytes([step])) and None)
+        finally:
+            os._exit(0)
+
+    def look(self, run: Path, accepted: set[int]) -> None:
+        """What a killed scan has left: everything that it told of, nothing twice, in order."""
+        self.outcome.kills += 1
+        self.outcome.accepted_before += len(accepted)
+        with opened(run) as record:
+            found = undated(record.readings())
+        steps = [r.step for r in found]
+        self.outcome.lost += len(accepted - set(steps))
+        self.outcome.duplicated += len(steps) - len(set(steps))
+        self.outcome.not_the_plan_s += steps != [s.index for s in self._plan.steps[: len(steps)]]
+        self.outcome.unequal += found != self._whole[: len(found)]
+
+    def finish(self, run: Path) -> None:
+        """Go on to the end; the result is that of the scan which nobody killed."""
+        scan(run, self._loaded, self._plan, lambda _: None)
+        with Record.open(run) as record:
+            self.outcome.results_unequal += undated(record.readings()) != self._whole
+            self.outcome.results_unequal += self._reduced(record) != self._brdf
+            self.outcome.jumped += sum(check.jumped for check in record.checks())
+        shutil.rmtree(run)
+
+
+def _after(seconds: float) -> Callable[[int], None]:
+    def waits(child: int) -> None:
+        time.sleep(seconds)  # the moment of the kill is what is drawn: nothing is waited for
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+
+    return waits
+
+
+def at_random(killer: Killer, folder: Path, kills: int, seed: int) -> None:
+    """Some scans are killed again while they go on."""
+    draw, run = random.Random(seed), folder / "run"
+    begun_s = time.monotonic()
+    scan(folder / "timed", killer._loaded, killer._plan, lambda _: None)
+    lasts_s = time.monotonic() - begun_s
+    while killer.outcome.kills < kills:
+        accepted = killer.killed(run, _after(draw.uniform(0, 1.1 * lasts_s)))
+        killer.look(run, accepted)
+        while draw.random() < 0.3 and killer.outcome.kills < kills:
+            killer.outcome.killed_twice += 1
+            accepted |= killer.killed(run, _after(draw.uniform(0, lasts_s)))
+            killer.look(run, accepted)
+        killer.finish(run)
+
+
+def at_entries(killer: Killer, folder: Path, stride: int) -> None:
+    """Before every entry of what the scan does to its files, until it is through."""
+    run, at, ended = folder / "run", 1, [-1]
+
+    def waits(child: int) -> None:
+        ended.append(os.waitpid(child, 0)[1])
+
+    while ended[-1] != 0:  # until nobody kills it: there are no more entries
+        steps = killer.killed(run, waits, at)
+        killer.look(run, steps)
+        killer.finish(run)
+        at += stride
+
+
+def recorded(folder: Path, log: Path) -> None:
+    """What a scan does to its files, with a mark after each step that it has accepted."""
+    loaded = changed(small_scan(), keep_frames=True)
+    plan, recorder = make_plan(loaded), ctypes.CDLL(None)
+
+    def stopped_half_way(step: int) -> None:
+        recorder.recorder_mark(step)
+        if step == len(plan.steps) // 2:
+            raise KeyboardInterrupt
+
+    recorder.recorder_begin(os.fsencode(log))
+    with suppress(KeyboardInterrupt):
+        scan(folder / "deep" / "run", loaded, plan, stopped_half_way)
+    scan(folder / "deep" / "run", loaded, plan, recorder.recorder_mark)
+
+
+def main() -> None:
+    folder = Path(sys.argv[1])
+    if sys.argv[2] == "record":
+        recorded(folder, Path(sys.argv[3]))
+        return
+    killer = Killer(folder)
+    if sys.argv[2] == "entries":
+        at_entries(killer, folder, int(sys.argv[3]))
+    else:
+        at_random(killer, folder, int(sys.argv[2]), int(sys.argv[3]))
+    sys.stdout.write(json.dumps(asdict(killer.outcome)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,165 @@
+"""An emulated V4L2 camera for tests: the device model here, OpenCV and driver in a child process.
+
+The loader reads LD_PRELOAD when a process starts, so the driver runs in a child of its own. One
+child serves a whole module; each test brings its own device model.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from shutil import which
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from drivers.v4l2.settings import V4l2Settings
+from instrument.devices import Frame
+from sim.emulated.v4l2.device import Description, EmulatedCamera, Exposure
+from sim.emulated.v4l2.server import V4l2Server
+from sim.emulated.v4l2.shim import compiled, environment
+from tests.support.paths import ROOT
+
+if which("cc") is None:
+    pytest.skip(
+        "no C compiler (cc): the emulated V4L2 camera cannot be built", allow_module_level=True
+    )
+
+DEVICE = "/dev/v4l/by-id/usb-emulated-camera"
+DEADLINE_S = 20.0
+SETTINGS = V4l2Settings(DEVICE, "Y16", 64, 48, 16, 0.001, 2.0, gain=100)
+QUICK = Description(frames_per_s=200, overhead_s=0.001)
+
+
+class RemoteCamera:
+    """The child process, as a camera."""
+
+    def __init__(self, folder: Path) -> None:
+        self.socket = folder / "camera"
+        ours, theirs = socket.socketpair()
+        added = environment(compiled(folder), DEVICE, self.socket)
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "tests.support.v4l2.child", str(theirs.fileno())],
+            env=os.environ | added,
+            cwd=ROOT,
+            pass_fds=[theirs.fileno()],
+        )
+        theirs.close()
+        self._pipe = Connection(ours.detach())
+
+    def end(self) -> None:
+        self._pipe.close()
+        self._process.wait(DEADLINE_S)
+
+    def begin(self, name: str, *arguments: object) -> None:
+        """Ask without waiting; `answer` gives the result."""
+        self._pipe.send((name, arguments))
+
+    def answer(self) -> Any:
+        if not self._pipe.poll(DEADLINE_S):
+            raise TimeoutError(f"the child has not answered for {DEADLINE_S} s")
+        result, error = self._pipe.recv()
+        if error is not None:
+            raise error
+        return result
+
+    def ask(self, name: str, *arguments: object) -> Any:
+        self.begin(name, *arguments)
+        return self.answer()
+
+    def interrupt(self) -> None:
+        """What Ctrl-C does."""
+        self._process.send_signal(signal.SIGINT)
+
+    def identity(self) -> str:
+        return str(self.ask("identity"))
+
+    def set_exposure_s(self, exposure_s: float) -> float:
+        return float(self.ask("set_exposure_s", exposure_s))
+
+    def grab(self, count: int) -> list[Frame]:
+        frames: list[Frame] = self.ask("grab", count)
+        return frames
+
+
+class Bench:
+    """What the emulated camera looks at: a level, and what was exposed of it when.
+
+    Each picture says in its first row what it is of: level, exposure in 100 µs, gain, sequence.
+    """
+
+    def __init__(self) -> None:
+        self.level = 0
+        self.exposed: list[Exposure] = []
+        self.begun = 0  # exposures, those included that nobody takes
+
+    def snapshot(self) -> object:
+        self.begun += 1
+        return self.level
+
+    def wait_exposures(self, count: int) -> None:
+        """Until the sensor has begun `count` more exposures."""
+        target = self.begun + count
+        wait_for(lambda: self.begun >= target, f"{count} more exposures")
+
+    def render(self, exposure: Exposure, seen: object) -> NDArray[Any]:
+        self.exposed.append(exposure)
+        image = np.zeros((exposure.height_px, exposure.width_px), np.uint16)
+        steps = round(exposure.exposure_s * 10_000)
+        assert isinstance(seen, int)
+        image[0, :4] = seen, steps, exposure.gain, exposure.sequence % 65536
+        return image
+
+    def exposure_of(self, frame: Frame) -> Exposure:
+        sequence = int(frame.image[0, 3])
+        return next(e for e in reversed(self.exposed) if e.sequence % 65536 == sequence)
+
+
+def level(frame: Frame) -> int:
+    return int(frame.image[0, 0])
+
+
+def steps(frame: Frame) -> int:
+    """The exposure that the picture is of, in 100 µs."""
+    return int(frame.image[0, 1])
+
+
+@contextmanager
+def served(
+    remote: RemoteCamera, bench: Bench, description: Description = QUICK, **able: Any
+) -> Iterator[EmulatedCamera]:
+    """The device model while a test needs it; the child lets go of it at the end."""
+    camera = EmulatedCamera(bench.render, bench.snapshot, replace(description, **able))
+    with V4l2Server(camera, remote.socket):
+        try:
+            yield camera
+        finally:
+            remote.ask("close")
+
+
+@contextmanager
+def child(factory: pytest.TempPathFactory) -> Iterator[RemoteCamera]:
+    remote = RemoteCamera(factory.mktemp("v4l2"))
+    try:
+        yield remote
+    finally:
+        remote.end()
+
+
+def wait_for(condition: Callable[[], bool], what: str) -> None:
+    """Look again and again until it is so, at most until the deadline."""
+    until_s = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < until_s, f"{what}: not within {DEADLINE_S} s"
+        time.sleep(0.001)

@@ -1,0 +1,318 @@
+"""Controllers that answer anything: the driver's result is true, or an error with a name.
+
+Real drivers over emulated controllers, on a wire of memory that spoils some of the answers. What
+is promised of a damaged answer depends on what protects it:
+
+- Modbus RTU: 16 bits of CRC. No wrong position is ever taken for the truth here.
+- Zaber: 8 bits of checksum. Any one wrong byte is found; of larger damages one in 256 may pass.
+- Newport: none. What is taken is a finite number in an answer to that very question.
+- Modbus TCP: TCP's own. A gateway may mix up answers: number, unit and length tell them apart.
+"""
+
+from __future__ import annotations
+
+import logging
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import pytest
+from pymodbus.exceptions import ModbusException
+from pymodbus.framer import FramerRTU
+from pymodbus.pdu import DecodePDU
+
+from drivers.lines.serial_line import Garbled, number_of
+from drivers.stages import newport_framing, oriental_framing, zaber_framing
+from drivers.stages.motor_stage import MotorStage
+from instrument.errors import DeviceError
+from sim.emulated.oriental_controller import crc
+from tests.support.stages.memory_wire import STEPS_PER_DEG, MemoryBench, Spoil, bench
+from tests.support.strangers.mutations import Mutator, feed
+
+KINDS = ("newport", "zaber", "oriental rtu", "oriental tcp")
+ONCE_MORE_S = 10.0  # simulated; the longest action has a time-out of 2.5 s and asks three times
+
+
+def status(stage: MotorStage, _: MemoryBench, __: random.Random) -> float:
+    return stage.status().position_deg
+
+
+def move(stage: MotorStage, _: MemoryBench, rng: random.Random) -> float:
+    stage.start_move(rng.uniform(-80.0, 80.0))
+    return stage.wait()
+
+
+def home(stage: MotorStage, _: MemoryBench, __: random.Random) -> float:
+    stage.home()
+    return stage.position_deg()
+
+
+def open_again(_: MotorStage, wire: MemoryBench, __: random.Random) -> float:
+    return wire.open().status().position_deg
+
+
+ACTIONS = (status, move, home, open_again)
+
+
+@dataclass
+class Session:
+    """A stage that has been homed, and what its wire makes of the answers."""
+
+    kind: str
+    wire: MemoryBench
+    spoil: Spoil
+    stage: MotorStage
+    wrong: int = 0
+
+    @classmethod
+    def of(cls, kind: str, patch: pytest.MonkeyPatch, seed: int = 1) -> Session:
+        """A session whose genuine answers, of every question once, are the mutator's examples."""
+        # pytest would keep all that is logged.
+        patch.setattr(logging.getLogger("pymodbus.logging"), "disabled", True)
+        wire = bench(kind, patch)
+        stage = wire.open()
+        stage.home()
+        stage.start_move(10.0)
+        assert stage.wait() == pytest.approx(10.0, abs=1e-3)
+        examples = tuple(dict.fromkeys(wire.port.genuine))
+        return cls(kind, wire, Mutator(examples, seed).spoil, stage)
+
+    def take(self, number: int) -> None:
+        """One action with some answers spoilt; then, with none, the truth."""
+        rng = random.Random(number)
+        wire, action = self.wire, rng.choice(ACTIONS)
+        wire.port.heard.clear()
+        wire.port.genuine.clear()
+        wire.clock.looks, began_s, moves = 0, wire.clock.now_s(), wire.moves()
+        wire.spoil_next(rng, self.spoil)
+        said = ""
+        try:
+            self._judge(action(self.stage, wire, rng))
+        except DeviceError as error:
+            said = str(error)
+        except BaseException as error:
+            error.add_note(f"{action.__name__}, heard {bytes(wire.port.heard[-2000:])!r}")
+            raise
+        assert said.isprintable(), "a message that a terminal could stumble over"
+        assert wire.clock.now_s() - began_s < ONCE_MORE_S
+        assert wire.moves() - moves <= (2 if self.kind == "oriental tcp" else 1)
+        self._heal()
+
+    def _judge(self, said_deg: float) -> None:
+        true = self.is_true(said_deg)
+        if self.kind == "newport":
+            assert true or said_deg in self._newport_numbers()
+        elif self.kind == "oriental rtu":
+            assert true, f"{said_deg} deg, and it stands at {self.wire.motor.position_deg} deg"
+        self.wrong += not true
+
+    def is_true(self, said_deg: float) -> bool:
+        return abs(said_deg - self.wire.motor.position_deg) < 2 / STEPS_PER_DEG
+
+    def _newport_numbers(self) -> set[float | None]:
+        """What whole answers to TP have said."""
+        lines = bytes(self.wire.port.heard).replace(b"\0", b"").split(b"\n")
+        answers = [line.strip(b"\r")[3:] for line in lines if line.startswith(b"1TP")]
+        return {number_of(text.decode("latin-1").strip()) for text in answers}
+
+    def _heal(self) -> None:
+        self.wire.port.spoil = lambda answer: answer
+        self.wire.clock.looks = 0
+        self.wire.clock.sleep(1.0)  # whatever it was told to do has ended
+        assert self.is_true(self.stage.status().position_deg), "wrong on a sound line"
+        if not self.wire.motor.referenced:
+            self.stage.home()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_whatever_comes_the_driver_says_the_truth_or_what_failed(
+    kind: str, slow: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session, count = Session.of(kind, monkeypatch), 10_000 if slow else 120
+    feed(lambda number: str(number).encode(), count, lambda data: session.take(int(data)))
+    if kind == "zaber":
+        assert session.wrong <= count / 256
+
+
+def _signed(kind: str, answer: bytes) -> bytes:
+    """A frame about whatever stands in the answer, with the check of its protocol."""
+    if kind == "zaber":
+        body = answer.partition(b":")[0].lstrip(b"@")
+        return b"@%b:%02X\r\n" % (body, -sum(body) & 0xFF)
+    if kind == "oriental rtu":
+        return answer[:-2] + crc(answer[:-2])
+    if kind == "oriental tcp":
+        return answer[:4] + (max(len(answer) - 6, 0) & 0xFFFF).to_bytes(2, "big") + answer[6:]
+    return answer.strip() + b"\r\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_controller_that_lies_in_due_form_gives_a_result_or_an_error(
+    kind: str, slow: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its frames are sound, what they say is not: no check can find a lie, but nothing breaks."""
+    session = Session.of(kind, monkeypatch, seed=2)
+    damaged = session.spoil
+    session.spoil = lambda rng, answer: _signed(kind, damaged(rng, answer))
+    session.kind = "oriental tcp"  # a lie may be taken, and a lie about a target be answered
+    feed(
+        lambda number: str(number).encode(),
+        10_000 if slow else 100,
+        lambda data: session.take(int(data)),
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["zaber", "oriental rtu"])
+def test_one_wrong_byte_in_a_position_is_never_taken(
+    kind: str, slow: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both checks find every error within one byte; here the driver does, at every place."""
+    session = Session.of(kind, monkeypatch)
+    length = len(session.wire.port.genuine[-1])
+    masks = range(1, 256) if slow else (16,)
+    for number in range(length * len(masks)):
+        at, mask = number % length, masks[number // length]
+
+        def damaged(answer: bytes, at: int = at, mask: int = mask) -> bytes:
+            place = at % len(answer)
+            return answer[:place] + bytes([answer[place] ^ mask]) + answer[place + 1 :]
+
+        session.wire.clock.looks, session.wire.port.spoil = 0, damaged
+        try:
+            taken = session.stage.status().position_deg
+        except Garbled:
+            continue
+        assert session.is_true(taken), (at, mask)
+
+
+def test_a_gateway_that_mixes_up_answers_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whole answers to other questions, other units, other transactions, and parts of them."""
+    session = Session.of("oriental tcp", monkeypatch)
+    earlier = list(session.wire.port.genuine)
+
+    def mixed(rng: random.Random, answer: bytes) -> bytes:
+        kind = rng.randrange(4)
+        if kind == 0:
+            return rng.choice(earlier)
+        if kind == 1:
+            return answer[: rng.randrange(len(answer))]
+        place = rng.choice((0, 1, 6)) if kind == 2 else rng.choice((2, 3, 4, 5))
+        return answer[:place] + bytes([answer[place] ^ rng.randrange(1, 256)]) + answer[place + 1 :]
+
+    session.spoil = mixed
+    for number in range(100):
+        session.take(number)
+    assert session.wrong == 0
+
+
+_NEWPORT = (
+    b"1TP-12.500000\r", b"1TS000033\r", b"1TS002028\r", b"1SL-95\r", b"1VA1.2E-05\r",
+    b"1VE SMC100_CC_Controller-driver version  2.0.0\r",
+)  # fmt: skip
+_ZABER = (
+    b"@01 1 07 OK IDLE -- -53333:1A\r", b"@01 0 01 OK IDLE WH 59999:AC\r",
+    b"@01 1 33 RJ BUSY -- BADDATA:6F\r", b"@01 1 05 OK BUSY FS 02 FS WH:9B\r", b"!01 1 IDLE --\r",
+)  # fmt: skip
+FRAMED = 100_000
+
+
+@pytest.mark.slow
+def test_newport_framing_reads_any_line(slow: bool) -> None:
+    """None, `Garbled`, or what stands in it: printable text, a finite number, a known state."""
+
+    def read(line: bytes) -> None:
+        for letters in ("TP", "TS", "VE"):
+            text = newport_framing.answer_to(1, letters, line)
+            if text is None:
+                continue
+            assert line.startswith(f"1{letters}".encode())
+            assert text.isprintable()
+            _or_garbled(lambda text=text: newport_framing.number("stage", "TP", text), _finite)
+            _or_garbled(lambda text=text: newport_framing.state("stage", text), _state)
+
+    feed(Mutator(_NEWPORT, 3), FRAMED if slow else 1000, read)
+
+
+def _or_garbled(read: Callable[[], object], check: Callable[[object], None]) -> None:
+    try:
+        found = read()
+    except Garbled:
+        return
+    check(found)
+
+
+def _finite(value: object) -> None:
+    assert isinstance(value, float)
+    assert abs(value) < float("inf")
+
+
+def _state(state: object) -> None:
+    assert isinstance(state, newport_framing.State)
+    assert 0 <= state.errors <= 0xFFFF
+    assert not (state.homed and state.name in ("not referenced", "homing", "configuration"))
+    assert state.fault.isprintable()
+
+
+@pytest.mark.slow
+def test_zaber_framing_reads_any_line(slow: bool) -> None:
+    """Whatever is taken for a reply has its checksum, and nothing but printable characters."""
+
+    def read(line: bytes) -> None:
+        for one in (line, _signed("zaber", line).rstrip(b"\r\n")):
+            reply = zaber_framing.reply_of(one)
+            if reply is None:
+                continue
+            body, check = one[1:].split(b":")
+            assert (sum(body) + int(check, 16)) % 256 == 0
+            assert (reply.warning + reply.data).isprintable()
+            assert zaber_framing.fault([reply.warning, *reply.data.split()]).isprintable()
+
+    feed(Mutator(_ZABER, 4, [b":", b"@", b" "]), FRAMED if slow else 1000, read)
+
+
+@pytest.mark.slow
+def test_oriental_framing_reads_any_registers(slow: bool) -> None:
+    """Registers hold any 16 bits: they are told apart from an AZ drive's, or read as such."""
+
+    def read(data: bytes) -> None:
+        words = [data[i] << 8 | data[i + 1] for i in range(0, 40, 2)]
+        direct = oriental_framing.direct_data_of(words[:16])
+        output = oriental_framing.output_of(words[16:])
+        values = (direct.position, direct.speed_hz, output.alarm)
+        assert all(-(1 << 31) <= value < 1 << 31 for value in values)
+        again = oriental_framing.words_of(direct.position)
+        assert again == (words[4], words[5])
+        if not oriental_framing.unlike_az(direct, output):
+            assert bool(output.fault) == bool(output.alarm)
+        assert (output.fault + str(direct)).isprintable()
+
+    examples = (bytes(40), bytes.fromhex("0000000000000001FFFFFF9C") + bytes(28))
+    spoilt = Mutator(examples, 5)
+    feed(lambda n: (spoilt(n) + bytes(40))[:40], FRAMED if slow else 1000, read)
+
+
+@pytest.mark.slow
+def test_whatever_the_modbus_framer_takes_has_its_crc(slow: bool) -> None:
+    """pymodbus takes frames apart, and finds one behind noise: the driver relies on its CRC."""
+    framer = FramerRTU(DecodePDU(False))
+    frames = [bytes.fromhex(text) for text in (
+        "010304FFFFFF9C", "0103080000403000000000", "0106007D0020", "011000580010", "018302",
+    )]  # fmt: skip
+
+    def read(data: bytes) -> None:
+        for frame in (data, data + crc(data)):
+            try:
+                _, pdu = framer.handleFrame(frame, 1, 0)
+            except (ModbusException, ValueError, IndexError):
+                continue  # the bus makes `Garbled` of it
+            if pdu is not None:
+                assert any(
+                    crc(frame[first:last]) == frame[last : last + 2]
+                    for first in range(len(frame))
+                    for last in range(first + 2, len(frame) - 1)
+                )
+
+    feed(Mutator([f + crc(f) for f in frames], 6), FRAMED // 10 if slow else 300, read)

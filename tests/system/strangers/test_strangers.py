@@ -1,0 +1,279 @@
+"""What strangers send is data: files, names and replies are read and shown, and never obeyed."""
+
+from __future__ import annotations
+
+import io
+import os
+import time
+from pathlib import Path
+
+import pytest
+from pydantic import TypeAdapter
+
+from acquisition.commands.scan import _default_folder
+from acquisition.terminal.console import _Harmless
+from analysis.data.csv_table import read_csv
+from analysis.report.data import ReportData
+from analysis.report.page import report_html
+from instrument.config.axes import Port
+from instrument.config.load import Loaded, load_protocol, load_rig
+from instrument.config.yaml_positions import MAX_BYTES
+from instrument.errors import DeviceError, InputError
+from instrument.text.atomic_file import write_whole
+from instrument.text.terminal_safe import first_unfit, harmless
+from tests.instrument.config.test_load import PROTOCOL, RIG
+from tests.support.csv_texts import BARE
+from tests.support.paths import CONFIGS
+from tests.support.stages.memory_wire import bench
+
+HARMFUL = "\x1b]0;mine\x07\x1b[2J\u202e[bold red]:skull:[link=http://x]here[/link]\r"
+
+
+TEXT = PROTOCOL.replace("rig: rig.yaml\n", "description: none\nrig: rig.yaml\n")
+
+
+def protocol(folder: Path, old: str, new: str) -> Loaded:
+    """The tests' own protocol with one thing changed, read with its rig beside it."""
+    assert TEXT.count(old) == 1
+    (folder / "p.yaml").write_text(TEXT.replace(old, new))
+    (folder / "rig.yaml").write_text(RIG)
+    return load_protocol(folder / "p.yaml")
+
+
+def refusal(folder: Path, old: str, new: str) -> str:
+    with pytest.raises(InputError) as refused:
+        protocol(folder, old, new)
+    return str(refused.value)
+
+
+# YAML.
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "!!python/object/apply:os.mkdir [executed]",
+        "!!python/object/new:os.mkdir [executed]",
+        "!!python/name:os.mkdir",
+        "!!python/module:executed",
+        "!!binary aGVsbG8=",
+        "!!timestamp 2026-01-01",
+        "!mine {a: 1}",
+    ],
+)
+def test_a_tag_makes_nothing_but_a_mistake(
+    value: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = refusal(tmp_path, "description: none", f"description: {value}")
+    assert said.startswith(f"{tmp_path / 'p.yaml'}:2:14: description: tag '")
+    assert "is not read; write the plain value" in said
+    assert not (tmp_path / "executed").exists()
+
+
+BOMBS = {
+    "laughs": "\n".join(
+        ["a0: &a0 [x, x]"] + [f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}]" for n in range(1, 300)]
+    ),
+    "merge keys": "\n".join(
+        ["a0: &a0 {k: v}"] + [f"a{n}: &a{n} {{<<: [*a{n - 1}, *a{n - 1}]}}" for n in range(1, 300)]
+    ),
+    "an alias of itself": "a: &a [*a, *a]",
+    "aliases for every angle": PROTOCOL.replace("[30, ", "[&a 30.0, " + "*a, " * 3000),
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_aliases_are_never_laid_out(name: str, tmp_path: Path) -> None:
+    """In less time than laying out even the 40th level would take, and the first place is told."""
+    path, rig = tmp_path / "p.yaml", tmp_path / "rig.yaml"
+    path.write_text(BOMBS[name])
+    rig.write_text(RIG)
+    began_s = time.process_time()
+    with pytest.raises(InputError, match=r"(anchor|alias|merge key) .* is not read") as refused:
+        load_protocol(path, rig)
+    assert time.process_time() - began_s < 10
+    assert len(str(refused.value)) < 60_000
+
+
+def test_many_refused_values_take_no_longer_than_each_alone(tmp_path: Path) -> None:
+    """Time goes with the number of aliases: ten times as many must not take a hundred times."""
+    (tmp_path / "rig.yaml").write_text(RIG)
+
+    def took_s(count: int) -> float:
+        text = f"sweeps:\n  - theta_r_deg: [&a 1.0, {'*a, ' * count}]\n"
+        (tmp_path / "p.yaml").write_text(text)
+        began_s = time.process_time()
+        with pytest.raises(InputError):
+            load_protocol(tmp_path / "p.yaml", tmp_path / "rig.yaml")
+        return time.process_time() - began_s
+
+    took_s(10)
+    assert took_s(5000) < 30 * took_s(500)
+
+
+# Paths.
+
+
+@pytest.mark.parametrize("rig", ["/dev/zero", "/dev/stdin", "/dev/tty", "pipe", "socket", "link"])
+def test_a_protocol_can_name_no_device_or_pipe_as_its_rig(rig: str, tmp_path: Path) -> None:
+    """Not even to be opened: reading some would wait for ever."""
+    os.mkfifo(tmp_path / "pipe")
+    os.mknod(tmp_path / "socket", 0o140600)
+    (tmp_path / "link").symlink_to("/dev/zero")
+    said = refusal(tmp_path, "rig: rig.yaml", f"rig: {rig}")
+    assert "cannot be read: it is no file but a device, a pipe or a socket" in said
+    os.mkfifo(tmp_path / "p2.yaml")
+    with pytest.raises(InputError, match="it is no file but a device"):
+        load_protocol(tmp_path / "p2.yaml")
+
+
+def test_another_file_is_only_read_as_yaml_and_not_told(tmp_path: Path) -> None:
+    """Whatever file a protocol names as its rig, its contents do not come out in the message."""
+    lines = [f"user{n}:x:{n}:{n}:secret number {n}:/home/user{n}:/bin/sh" for n in range(500)]
+    (tmp_path / "passwd").write_text("\n".join(lines))
+    inner = tmp_path / "a" / "b"
+    inner.mkdir(parents=True)
+    for path in ("../../passwd", str(tmp_path / "passwd")):
+        said = refusal(inner, "rig: rig.yaml", f"rig: {path}")
+        assert "allowed: a block of `key: value` lines" in said
+        assert "secret" not in said
+        assert len(said) < 1000
+    (tmp_path / "passwd").write_text("password: secret\nothers: [secret, secret]\n")
+    assert "secret" not in refusal(inner, "rig: rig.yaml", "rig: ../../passwd")
+
+
+def test_a_large_file_is_refused_without_being_read_whole(tmp_path: Path) -> None:
+    path = tmp_path / "p.yaml"
+    with path.open("wb") as file:
+        file.truncate(50 * 1024**3)  # takes no space
+    with pytest.raises(InputError, match=f"too large; allowed: {MAX_BYTES // 1024} kB"):
+        load_protocol(path)
+    with pytest.raises(InputError, match="the file is too large; allowed: 64 MB"):
+        read_csv(path)
+
+
+def test_no_link_leads_what_is_written_elsewhere(tmp_path: Path) -> None:
+    """Neither under the file's own name nor under the temporary one."""
+    victim = tmp_path / "mine.txt"
+    victim.write_text("mine")
+    for name in ("fit.json", f".fit.json.{os.getpid()}.part"):
+        (tmp_path / name).symlink_to(victim)
+    write_whole(tmp_path / "fit.json", "new")
+    assert victim.read_text() == "mine"
+    assert (tmp_path / "fit.json").read_text() == "new"
+    assert not (tmp_path / "fit.json").is_symlink()
+
+
+@pytest.mark.parametrize("port", ["spy:///dev/null?file=mine.txt", "loop://", "alt://x?class=y"])
+def test_a_port_is_a_device_or_an_address_and_writes_no_file(port: str, tmp_path: Path) -> None:
+    text = (CONFIGS / "rigs" / "emulated.yaml").read_text().replace("port: emulated", "port: P", 1)
+    (tmp_path / "rig.yaml").write_text(text.replace("port: P", f"port: '{port}'"))
+    with pytest.raises(InputError, match=r"axes\.theta_i\.port: .*allowed: a device's path, sock"):
+        load_rig(tmp_path / "rig.yaml")
+    for good in ("/dev/serial/by-path/pci-0000:00:14.0-usb-0:2:1.0-port0", "socket://gate:4001"):
+        assert TypeAdapter(Port).validate_python(good) == good
+
+
+# Names.
+
+
+@pytest.mark.parametrize("escape", ["\\e[2J", "\\x07", "\\r", "\\0", "\\x9b", "\\u202e", "\\L"])
+def test_a_name_holds_no_command_to_a_terminal(escape: str, tmp_path: Path) -> None:
+    said = refusal(tmp_path, "description: none", f'description: "a{escape}b"')
+    assert "holds a control character" in said
+    assert first_unfit(said) is None
+    key = refusal(tmp_path, "description: none", f'"a{escape}b": none')
+    assert first_unfit(key) is None
+
+
+def test_a_name_has_one_line(tmp_path: Path) -> None:
+    """A second line of a name could pass for a prompt of the program's own."""
+    said = refusal(tmp_path, "name: foam\n", 'name: "a\\nGo on? y"\n')
+    assert "name: 'a\\nGo on? y' has more than one line" in said
+    described = protocol(tmp_path, "description: none", 'description: "one\\ntwo"')
+    assert described.protocol.description == "one\ntwo"
+
+
+def test_a_name_leads_to_no_other_folder(tmp_path: Path) -> None:
+    """A run's folder is called after the protocol's file, whatever stands in it."""
+    loaded = protocol(tmp_path, "name: foam\n", "name: ../../../x/\n")
+    folder = _default_folder(loaded)
+    assert folder.parent == Path("runs")
+    assert folder.name.startswith("p-")
+
+
+def test_names_are_shown_as_they_stand_on_the_terminal() -> None:
+    shown = io.StringIO()
+    _Harmless(file=shown, markup=False, emoji=False, force_terminal=True, width=200).print(
+        HARMFUL, highlight=False
+    )
+    text = shown.getvalue()
+    assert "\\x1b[2J" in text
+    assert "\\u202e" in text
+    assert "[bold red]:skull:[link=http://x]here[/link]" in text
+    assert first_unfit(text) is None
+
+
+def test_what_is_harmless_is_left_alone() -> None:
+    plain = "Schaumstoff – 石膏 – ρ = 0,8\u00a0% (à 20\u2009°C)\n\tθᵢ ±2°"
+    assert harmless(plain) == plain
+    assert harmless("a\x1bb\ud800") == "a\\x1bb\\ud800"
+
+
+def test_names_are_escaped_in_the_report() -> None:
+    import numpy as np
+
+    bad = '</title><script>alert(1)</script>"><img src=x onerror=alert(1)>'
+    one = np.ones(1)
+    page = report_html(
+        ReportData(
+            title=bad, sample=bad, description=bad, verdict=(bad,), verdict_kind="", notes=(bad,),
+            theta_i_deg=one, dphi_deg=one, theta_r_deg=one, brdf=one, u_brdf=one, radiance=one,
+            u_radiance=one, flags=(bad,), fitted=np.array([False]), budget=((bad, 1.0, 100.0),),
+            rig=((bad, bad),), devices=((bad, bad),), versions=((bad, bad),), times=((bad, bad),),
+        )
+    )  # fmt: skip
+    assert "<script" not in page
+    assert "<img" not in page
+    assert page.count("&lt;script&gt;") >= 12
+
+
+def test_a_zaber_that_sends_commands_to_the_terminal_is_not_repeated(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its checksum is right: what it says is still shown to nobody, and is no answer."""
+    wire = bench("zaber", monkeypatch)
+
+    def coloured(answer: bytes) -> bytes:
+        body = answer[1 : answer.index(b":")] + b"\x1b[2J"
+        return b"@%b:%02X\r\n" % (body, -sum(body) & 0xFF)
+
+    wire.port.spoil = coloured
+    with pytest.raises(DeviceError) as failed:
+        wire.open()
+    assert first_unfit(str(failed.value)) is None
+
+
+# Tables.
+
+
+def test_a_line_of_50_mb_and_a_million_columns_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(BARE.encode() + b"1," * 25_000_000)
+    with pytest.raises(InputError, match=r"a\.csv:4:1: a line of 50000000 characters; allowed: "):
+        read_csv(path)
+    path.write_bytes(b"theta_i_deg," * 80_000)
+    with pytest.raises(InputError, match=r"a\.csv:1:1: header: 80001 columns; allowed: 1000"):
+        read_csv(path)
+
+
+def test_a_table_that_is_all_wrong_is_not_read_to_its_end(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(BARE.encode() + b"xy\n" * 100_000)
+    with pytest.raises(InputError) as refused:
+        read_csv(path)
+    assert refused.value.problems[-1] == "... and at least 9980 more"
+    path.write_bytes(BARE.encode() + b"\n" * 3_000_000)
+    with pytest.raises(InputError, match="lines; allowed: 2000000; split it"):
+        read_csv(path)

@@ -1,0 +1,166 @@
+"""The whole scan with real drivers over emulated devices: the same results as the simulation."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.support.command import gonio, gonio_here
+from tests.support.paths import CONFIGS, ROOT
+from tests.support.scans import small_demo
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"
+)
+RIG = CONFIGS / "rigs" / "emulated.yaml"
+TRUTH = {"albedo": 0.80, "sigma_deg": 20.0, "ks": 0.076}
+
+
+@pytest.fixture(scope="module")
+def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The demo's with two incidences and nine view angles."""
+    return small_demo(tmp_path_factory.mktemp("protocol"))
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory, protocol: Path) -> Path:
+    folder = tmp_path_factory.mktemp("emulated") / "run"
+    done = gonio("run", protocol, "--rig", RIG, "--out", folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_the_truth_comes_back_within_its_uncertainty(run: Path) -> None:
+    fit = json.loads((run / "fit.json").read_text())
+    assert (fit["chosen"], fit["verdict"]) == ("oren_nayar+torrance_sparrow", "adequate")
+    found = next(c for c in fit["candidates"] if c["model"] == fit["chosen"])["parameters"]
+    for name, true in TRUTH.items():
+        assert abs(found[name]["value"] - true) < 4 * found[name]["u"], name
+
+
+def test_each_point_agrees_with_the_simulation(run: Path, tmp_path: Path, protocol: Path) -> None:
+    """The same optics and lamp, simulated: what differs is noise, drift and the angles' errors."""
+    plain = tmp_path / "plain.yaml"
+    plain.write_text(simulated(RIG.read_text()))
+    done = gonio_here("run", protocol, "--rig", plain, "--out", tmp_path / "run")
+    assert done.returncode == 0, done.stderr
+    ours, theirs = points(run), points(tmp_path / "run")
+    assert ours.keys() == theirs.keys()
+    apart = [(f - g) / (u**2 + v**2) ** 0.5 for (f, u), (g, v) in
+             ((ours[k], theirs[k]) for k in ours)]  # fmt: skip
+    assert max(map(abs, apart)) < 4.5
+    assert sum(x * x for x in apart) / len(apart) < 1.5
+
+
+def simulated(text: str) -> str:
+    """The emulated rig's file with simulated devices in place of drivers."""
+    rig = yaml.safe_load(text)
+    for axis in rig["axes"].values():
+        for key in ("port", "model", "parity", "steps_per_deg", "microsteps_per_deg"):
+            axis.pop(key, None)
+        axis["driver"] = "simulated"
+    for key in ("device", "pixel_format", "exposure_delay_frames", "frames_per_s"):
+        rig["camera"].pop(key)
+    rig["camera"]["driver"] = "simulated"
+    return str(yaml.safe_dump(rig))
+
+
+def points(folder: Path) -> dict[tuple[float, ...], tuple[float, float]]:
+    with (folder / "measurements.csv").open() as file:
+        return {
+            tuple(float(row[k]) for k in ("theta_i_deg", "dphi_deg", "theta_r_deg")):
+            (float(row["brdf"]), float(row["u_brdf"]))
+            for row in csv.DictReader(file)
+        }  # fmt: skip
+
+
+def test_the_record_says_who_answered_and_when_each_frame_was_taken(run: Path) -> None:
+    with sqlite3.connect(f"file:{run / 'record.sqlite'}?mode=ro", uri=True) as record:
+        devices = dict(record.execute("SELECT role, identity FROM device"))
+        frames = record.execute(
+            "SELECT step, time_s, device_time_s FROM frame ORDER BY step, number"
+        ).fetchall()
+        readings = dict(record.execute("SELECT step, frames FROM reading"))
+    assert "SMC100" in devices["theta_i"]
+    assert "Oriental Motor AZ" in devices["dphi"]
+    assert "Zaber" in devices["theta_r"]
+    assert "12 bit" in devices["camera"]
+    assert len(frames) == sum(readings.values())
+    stamps = [stamp for _, _, stamp in frames]
+    assert stamps == sorted(stamps)
+    assert all(0 <= read - stamp < 0.5 for _, read, stamp in frames)
+
+
+def test_a_stopped_scan_goes_on_where_it_was(tmp_path: Path, protocol: Path) -> None:
+    folder, rig = tmp_path / "run", tmp_path / "rig.yaml"
+    rig.write_text(RIG.read_text().replace("homing_s: 2.0", "homing_s: 0.2"))  # homed twice here
+    command = [sys.executable, "-m", "acquisition", "run", str(protocol),
+               "--rig", str(rig), "--out", str(folder)]  # fmt: skip
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL,
+                          stdout=subprocess.DEVNULL, text=True) as scanning:  # fmt: skip
+        wait_for_readings(folder, 5)
+        scanning.send_signal(signal.SIGTERM)
+        _, said = scanning.communicate(timeout=60)
+    assert scanning.returncode == 4
+    assert f"gonio resume {folder}" in said
+    done = gonio("resume", folder, "--yes", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["verdict"] == "adequate"
+    assert len(points(folder)) == 17  # in one, camera and lamp hide one another
+
+
+def wait_for_readings(folder: Path, count: int) -> None:
+    end_s = time.monotonic() + 60
+    while time.monotonic() < end_s:
+        try:
+            with sqlite3.connect(f"file:{folder / 'record.sqlite'}?mode=ro", uri=True) as record:
+                if record.execute("SELECT COUNT(*) FROM reading").fetchone()[0] >= count:
+                    return
+        except sqlite3.Error:
+            pass  # not there yet
+        time.sleep(0.01)
+    raise AssertionError("the scan did not get that far")
+
+
+def test_the_rig_s_devices_say_who_they_are() -> None:
+    done = gonio("devices", "--rig", RIG)
+    assert done.returncode == 0, done.stderr
+    for word in ("SMC100", "Oriental Motor AZ", "Zaber device", "Y16 320 x 256 pixels"):
+        assert word in done.stdout
+
+
+def test_a_frame_of_the_emulated_camera(tmp_path: Path) -> None:
+    done = gonio(
+        "grab", "--rig", RIG, "-o", tmp_path / "aim.png", "--exposure-s", "0.001", "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["window_mean_dn"] > 200
+
+
+def test_an_emulated_axis_is_homed_and_moved() -> None:
+    done = gonio("move", "dphi", "30", "--rig", RIG)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout.split()[-2]) == pytest.approx(30.0, abs=0.01)
+
+
+def test_without_a_compiler_the_emulated_rig_says_so(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "acquisition", "run", "configs/protocols/demo.yaml", "--rig",
+         str(RIG), "--out", str(tmp_path / "run")],
+        cwd=ROOT, capture_output=True, text=True, timeout=60, check=False,
+        env={**os.environ, "PATH": "/nowhere"},
+    )  # fmt: skip
+    assert done.returncode == 3
+    assert "no C compiler" in done.stderr
+    assert not (tmp_path / "run").exists()

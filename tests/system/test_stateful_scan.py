@@ -1,0 +1,300 @@
+"""Stopped, failed, refused, killed and gone on with, in any order: the record is of one scan.
+
+The program has no pause of its own: to pause is Ctrl-C, to go on `gonio resume`.
+"""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+from unittest.mock import patch
+
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    invariant,
+    precondition,
+    rule,
+    run_state_machine_as_test,
+)
+
+from acquisition.commands.scan_session import scan
+from acquisition.engine.engine import Devices, Engine
+from acquisition.plan.plan import Plan, make_plan
+from acquisition.rig import open_devices
+from instrument.config.load import Loaded
+from instrument.config.protocol import DriftCheck, References, WhiteTile
+from instrument.errors import DeviceError, InputError, OperatorStop
+from instrument.record.reading import Reading
+from instrument.record.record import FILE_NAME, Record
+from tests.acquisition.engine.test_resume import so_far
+from tests.support.scans import changed, small_scan, undated
+
+RAM = Path("/dev/shm")  # thousands of commits: not on a disk, where there is memory to write to
+LONGER = 400  # calls of devices than any of these scans makes
+
+
+class Killed(BaseException):
+    """The process is no more: nothing that it would have done is done."""
+
+
+@cache
+def tiny_scan() -> Loaded:
+    """Twelve steps: two incidences of three views, tile, drift checks; six pixels to a side."""
+    small = small_scan(shrink=20)
+    return changed(
+        small,
+        sweeps=[
+            {"theta_i_deg": [30.0, 60.0], "dphi_deg": [0.0], "theta_r_deg": [-35.0, 0.0, 35.0]}
+        ],
+        references=References(
+            white_tile=WhiteTile(reflectance=0.99, u_reflectance=0.005, theta_r_deg=10.0, frames=2),
+            drift_check=DriftCheck(theta_r_deg=10.0, every_points=2),
+        ),
+        window=small.protocol.window.model_copy(update={"min_pixels": 10}),
+        frames_per_point=2,
+        dark_frames=2,
+    )
+
+
+@cache
+def tiny_plan() -> Plan:
+    return make_plan(tiny_scan())
+
+
+@cache
+def undisturbed() -> tuple[Reading, ...]:
+    """The readings of the scan that nothing interrupts."""
+    loaded = tiny_scan()
+    with TemporaryDirectory() as folder, Record.create(Path(folder) / "run", {}) as record:
+        Engine(loaded.protocol, loaded.rig, open_devices(loaded), record, [].append).run(
+            tiny_plan()
+        )
+        return tuple(undated(record.readings()))
+
+
+@dataclass
+class Tripwire:
+    """Every call of a device passes here; the one numbered `at` ends as `error` says.
+
+    `impatient`: a Ctrl-C more, at the first stop after that.
+    """
+
+    at: int = LONGER
+    error: BaseException | None = None
+    impatient: bool = False
+    calls: list[str] = field(default_factory=list)
+    dead: bool = False
+
+    def around(self, name: str, device: object) -> Any:
+        """The device, with the wire before each of its calls."""
+        return _Wired(self, name, device)
+
+    def passing(self, name: str) -> None:
+        if self.dead:
+            raise Killed
+        self.calls.append(name)
+        error = self.error
+        if len(self.calls) > self.at and error is not None and self._fits(name, error):
+            self.error, self.dead = None, isinstance(error, Killed)
+            raise error
+        if error is None and self.impatient and name.endswith(".stop"):
+            self.impatient = False
+            raise KeyboardInterrupt
+
+    def _fits(self, name: str, error: BaseException) -> bool:
+        """Only who is asked can refuse; what makes safe may fail, but that ends no scan."""
+        if isinstance(error, OperatorStop):
+            return name == "operator.ask"
+        made_safe = name.endswith(".stop") or name == "lamp.darken"
+        return not (isinstance(error, DeviceError) and made_safe)
+
+
+class _Wired:
+    def __init__(self, wire: Tripwire, name: str, device: object) -> None:
+        self._wire, self._name, self._device = wire, name, device
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._device, name)
+        if not callable(found):
+            return found
+
+        def call(*arguments: object) -> object:
+            self._wire.passing(f"{self._name}.{name}")
+            return found(*arguments)
+
+        return call
+
+
+def wired(devices: Devices, wire: Tripwire) -> Devices:
+    axes = {name: wire.around(name, axis) for name, axis in devices.axes.items()}
+    named = {
+        name: wire.around(name, getattr(devices, name)) for name in ("camera", "lamp", "operator")
+    }
+    return replace(devices, axes=axes, **named)
+
+
+ENDS: dict[str, Callable[[], BaseException]] = {
+    "stopped": KeyboardInterrupt,
+    "refused": lambda: OperatorStop("no"),
+    "fault": lambda: DeviceError("camera: no frame"),
+    "killed": Killed,
+}
+RAISED = {
+    "stopped": OperatorStop, "refused": OperatorStop, "fault": DeviceError, "killed": Killed,
+}  # fmt: skip
+EVENT = {"stopped": "stopped", "refused": "stopped", "fault": "fault"}
+
+
+class ScanMachine(RuleBasedStateMachine):
+    """One run's folder, and what is done to it; each scan drives a bench that knows no reference.
+
+    `ends`: the events that the scans so far must have left.
+    """
+
+    @initialize()
+    def begin(self) -> None:
+        self._open = ExitStack()
+        folder = self._open.enter_context(TemporaryDirectory(dir=RAM if RAM.is_dir() else None))
+        self.folder = Path(folder) / "run"
+        self.record = Record.create(self.folder, {})
+        self.begun, self.ends = False, list[str]()
+        self.wire, self.engine = Tripwire(), None
+
+    def teardown(self) -> None:
+        """Whatever happened: going on to the end gives the whole scan."""
+        if not hasattr(self, "record"):
+            return
+        if not self.complete:
+            self.run(None)
+        assert undated(self.record.readings()) == list(undisturbed())
+        self.record.close()
+        self._open.close()
+
+    @property
+    def complete(self) -> bool:
+        return len(self.record.readings()) == len(tiny_plan().steps)
+
+    def run(self, end: str | None, at: int = LONGER, impatient: bool = False) -> None:
+        """Scan, or go on, as the commands do, until a call of a device ends it."""
+        loaded, before = tiny_scan(), so_far(self.record) if self.begun else None
+        self.begun = True
+        self.wire = Tripwire(at, ENDS[end]() if end else None, impatient and end is not None)
+        with (
+            patch("acquisition.commands.scan_session.open_devices", self._opened),
+            patch("acquisition.commands.scan_session.Engine", self._made),
+        ):
+            try:
+                with self.record.claimed():
+                    scan(loaded, tiny_plan(), self.record, before)
+            except (OperatorStop, DeviceError, Killed) as error:
+                how, raised = end or "", error
+            else:
+                how, raised = "", None
+        tripped = end is not None and self.wire.error is None
+        assert (type(raised), how) == ((RAISED[end], end) if end and tripped else (type(None), ""))
+        self._ended(how)
+        self._left_safe()
+
+    def _opened(self, loaded: Loaded) -> Devices:
+        return wired(open_devices(loaded), self.wire)
+
+    def _made(self, *arguments: Any) -> Engine:
+        self.engine = Engine(*arguments)
+        return self.engine
+
+    def _ended(self, end: str) -> None:
+        if end == "killed":
+            self.record.close()
+            self.record, self.engine = Record.open(self.folder), None
+        else:
+            self.ends.append(EVENT.get(end, "finished"))
+
+    def _left_safe(self) -> None:
+        """Every axis was told to stop after the last motion began, and the lamp is dark."""
+        if self.wire.dead:
+            return
+        calls = self.wire.calls
+        begun = [n for n, c in enumerate(calls) if c.endswith((".start_move", ".home"))]
+        last = begun[-1] if begun else -1
+        assert {f"{axis}.stop" for axis in ("theta_i", "dphi", "theta_r")} <= set(calls[last + 1 :])
+        lamp = [c for c in calls if c in ("lamp.light", "lamp.darken")]
+        assert lamp[-1] == "lamp.darken"
+
+    @precondition(lambda self: not self.complete)
+    @rule(end=st.sampled_from(list(ENDS)), at=st.integers(0, 150), impatient=st.booleans())
+    def scan_until(self, end: str, at: int, impatient: bool) -> None:
+        self.run(end, at, impatient)
+
+    @precondition(lambda self: self.engine is not None)
+    @rule()
+    def latched(self) -> None:
+        """The engine that has ended drives nothing again."""
+        calls = list(self.wire.calls)
+        with pytest.raises(DeviceError, match="nothing moves again before the operator"):
+            self.engine.run(tiny_plan(), so_far(self.record))
+        assert self.wire.calls == calls
+
+    @rule()
+    def claimed_twice(self) -> None:
+        """A second scan into the same run is refused, and named who scans; then it may."""
+        with Record.open(self.folder) as other:
+            with (
+                self.record.claimed(),
+                pytest.raises(InputError, match=rf"process {os.getpid()} is scanning"),
+                other.claimed(),
+            ):
+                pass
+            with other.claimed():
+                pass
+
+    @rule()
+    def opened_again(self) -> None:
+        self.record.close()
+        self.record = Record.open(self.folder)
+
+    @invariant()
+    def the_readings_are_the_first_of_the_plan_and_the_undisturbed_ones(self) -> None:
+        if hasattr(self, "record"):
+            readings = undated(self.record.readings())
+            assert readings == list(undisturbed()[: len(readings)])
+
+    @invariant()
+    def what_belongs_to_readings_belongs_to_accepted_ones(self) -> None:
+        if not hasattr(self, "record"):
+            return
+        readings = self.record.readings()
+        other = sqlite3.connect(f"file:{self.folder / FILE_NAME}?mode=ro", uri=True)
+        frames = dict(other.execute("SELECT step, count(*) FROM frame GROUP BY step"))
+        other.close()
+        assert frames == {r.step: r.frames for r in readings}
+        shown = [step.index for step in tiny_plan().steps[: len(readings)] if step.preview]
+        assert [preview.step for preview in self.record.previews()] == shown
+        assert {r.exposure_s for r in readings} <= {dark[0] for dark in self.record.darks()}
+        assert not any(check.jumped for check in self.record.checks())
+
+    @invariant()
+    def every_end_is_told(self) -> None:
+        if hasattr(self, "record"):
+            told = ("stopped", "fault", "finished")
+            assert [kind for _, kind, _ in self.record.events() if kind in told] == self.ends
+
+
+@pytest.mark.slow
+def test_however_often_a_scan_is_ended_and_gone_on_with_it_is_the_same_scan(slow: bool) -> None:
+    machine: Any = ScanMachine
+    examples, steps = (400, 15) if slow else (12, 6)
+    run_state_machine_as_test(
+        machine,
+        settings=settings(max_examples=examples, stateful_step_count=steps, derandomize=not slow),
+    )

@@ -1,0 +1,250 @@
+"""A full disk, one closed to us, a folder moved or removed, a clock set back: nothing is lost."""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from acquisition.commands.scan_session import scan
+from acquisition.engine.engine import Devices
+from acquisition.engine.resume import SoFar
+from acquisition.plan.plan import make_plan
+from acquisition.rig import open_devices
+from instrument.clock import Clock
+from instrument.errors import StorageError
+from instrument.record.reading import Reading
+from instrument.record.record import Record
+from instrument.text.atomic_file import write_whole
+from tests.support.command import gonio
+from tests.support.paths import CONFIGS, ROOT
+from tests.support.scans import changed, small_scan, undated
+
+LOADED = small_scan()
+PLAN = make_plan(LOADED)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> list[Reading]:
+    with Record.create(tmp_path_factory.mktemp("whole") / "run", {}) as record:
+        scan(LOADED, PLAN, record)
+        return undated(record.readings())
+
+
+def at_step(
+    monkeypatch: pytest.MonkeyPatch, step: int, happens: Callable[[Devices], Devices | None]
+) -> None:
+    """Have something happen when the scan begins that step."""
+
+    def opening(loaded: object) -> Devices:
+        devices = open_devices(LOADED)
+
+        def begin_step(number: int, planned_s: float) -> None:
+            if number == step:
+                happens(devices)
+            devices.begin_step(number, planned_s)
+
+        return replace(devices, begin_step=begin_step)
+
+    monkeypatch.setattr("acquisition.commands.scan_session.open_devices", opening)
+
+
+def test_a_run_folder_that_is_moved_ends_the_scan_with_its_new_name(
+    whole: list[Reading], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old, new = tmp_path / "run", tmp_path / "elsewhere"
+    at_step(monkeypatch, 8, lambda _: old.rename(new) and None)
+    with Record.create(old, {}) as record:
+        with pytest.raises(StorageError) as failed:
+            scan(LOADED, PLAN, record)
+        accepted = len(record.readings())
+    assert "was moved while the scan ran: nothing accepted is lost" in str(failed.value)
+    assert f"gonio resume {new}" in str(failed.value)
+    assert accepted == 7
+    monkeypatch.undo()
+    with Record.open(new) as record:
+        scan(LOADED, PLAN, record, SoFar(tuple(record.readings())))
+        assert undated(record.readings()) == whole
+
+
+def test_a_run_folder_that_is_removed_is_said_to_be_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_step(monkeypatch, 8, lambda _: shutil.rmtree(tmp_path / "run"))
+    with (
+        Record.create(tmp_path / "run", {}) as record,
+        pytest.raises(StorageError, match="was removed while the scan ran, and the") as failed,
+    ):
+        scan(LOADED, PLAN, record)
+    assert "gonio resume" not in str(failed.value)  # there is nothing to go on from
+
+
+def test_a_clock_that_is_set_back_changes_the_dates_and_nothing_else(
+    whole: list[Reading], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class SetBack:
+        """An hour back from a moment on; what only grows goes on growing."""
+
+        def __init__(self, clock: Clock) -> None:
+            self._clock, self.back = clock, timedelta()
+
+        def utc(self) -> datetime:
+            return self._clock.utc() - self.back
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(self._clock, name)
+
+    def opening(loaded: object) -> Devices:
+        devices = open_devices(LOADED)
+        clock = SetBack(devices.clock)
+
+        def begin_step(number: int, planned_s: float) -> None:
+            clock.back = timedelta(hours=number >= 6)
+            devices.begin_step(number, planned_s)
+
+        return replace(devices, clock=clock, begin_step=begin_step)  # type: ignore[arg-type]  # a stand-in
+
+    monkeypatch.setattr("acquisition.commands.scan_session.open_devices", opening)
+    with Record.create(tmp_path / "run", {}) as record:
+        scan(LOADED, PLAN, record)
+        dates = [r.time_utc for r in record.readings()]
+        assert dates != sorted(dates)
+        assert undated(record.readings()) == whole
+
+
+# The whole command, on a disk with a quota.
+
+
+@pytest.fixture(scope="module")
+def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The demo's foam with a coarse sweep, and a few frames that are kept."""
+    folder = tmp_path_factory.mktemp("protocol")
+    text = (CONFIGS / "protocols" / "demo.yaml").read_text()
+    text = text.replace("num: 33", "num: 5").replace("frames_per_point: 4", "frames_per_point: 2")
+    text = text.replace("../rigs", str(CONFIGS / "rigs")) + "keep_frames: true\n"
+    (folder / "small.yaml").write_text(text)
+    return folder / "small.yaml"
+
+
+@pytest.fixture(scope="module")
+def finished(protocol: Path, tmp_path_factory: pytest.TempPathFactory) -> list[list[str]]:
+    """measurements.csv of a run with room enough."""
+    folder = tmp_path_factory.mktemp("finished") / "run"
+    done = gonio("run", protocol, "--out", folder)
+    assert done.returncode == 0, done.stderr
+    return table(folder)
+
+
+def table(run: Path) -> list[list[str]]:
+    """measurements.csv but for the dates."""
+    with (run / "measurements.csv").open(newline="") as file:
+        rows = list(csv.reader(file))
+    dated = rows[0].index("time_utc")
+    return [row[:dated] + row[dated + 1 :] for row in rows]
+
+
+def on_a_disk(
+    recorder: dict[str, str], root: Path, trouble: dict[str, str], *arguments: object
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "acquisition", *map(str, arguments)],
+        env={**os.environ, **recorder, "GONIO_RECORD_ROOT": str(root), **trouble},
+        cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
+        stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+
+
+# Bytes written: into a frame, into the record, and before there is a record at all.
+@pytest.mark.parametrize("quota", [9_000_000, 2_500_000])
+def test_a_full_disk_ends_the_scan_and_with_more_room_it_goes_on(
+    quota: int,
+    protocol: Path,
+    finished: list[list[str]],
+    recorder: dict[str, str],
+    tmp_path: Path,
+) -> None:
+    run = tmp_path / "disk" / "run"
+    trouble = {"GONIO_RECORD_QUOTA": str(quota)}
+    done = on_a_disk(recorder, tmp_path / "disk", trouble, "run", protocol, "--out", run)
+    assert done.returncode == 3, done.stderr
+    assert "the disk is full" in done.stderr
+    assert "make room on it" in done.stderr
+    assert f"gonio resume {run}" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (run / "measurements.csv").exists()
+    with Record.open(run) as record:
+        assert all((run / name).stat().st_size > 0 for name in record.frame_files())
+        assert not list(run.glob("**/.*.part"))
+    resumed = gonio("resume", run, "--yes")
+    assert resumed.returncode == 0, resumed.stderr
+    assert table(run) == finished
+
+
+def test_a_disk_that_is_full_before_the_run_has_begun_leaves_nothing_behind(
+    protocol: Path, recorder: dict[str, str], tmp_path: Path
+) -> None:
+    run = tmp_path / "disk" / "run"
+    trouble = {"GONIO_RECORD_QUOTA": "20000"}
+    done = on_a_disk(recorder, tmp_path / "disk", trouble, "run", protocol, "--out", run)
+    assert done.returncode == 2, done.stderr
+    assert f"{run}: no run can be written there: the disk is full" in done.stderr
+    assert not run.exists()
+
+
+def test_a_read_only_folder_is_named_and_what_is_in_it_stays(
+    protocol: Path, recorder: dict[str, str], tmp_path: Path
+) -> None:
+    disk = tmp_path / "disk"
+    with Record.create(disk / "run", {}):
+        pass
+    trouble = {"GONIO_RECORD_READ_ONLY": "1"}
+    done = on_a_disk(recorder, disk, trouble, "run", protocol, "--out", disk / "new")
+    assert done.returncode == 2, done.stderr
+    assert "look at the folder's permissions" in done.stderr
+    for command in ("resume", "report"):
+        done = on_a_disk(recorder, disk, trouble, command, disk / "run")
+        assert done.returncode == 3, done.stderr
+        assert "cannot be written" in done.stderr
+        assert "look at the folder's permissions" in done.stderr
+        assert "Traceback" not in done.stderr
+
+
+def test_frames_that_would_not_fit_are_refused_before_anything_moves(
+    protocol: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from acquisition.engine import frame_files as kept_frames
+    from instrument.errors import InputError
+
+    loaded = changed(LOADED, keep_frames=True)
+    needed = kept_frames.kept_bytes(PLAN, loaded)
+    camera = LOADED.rig.camera
+    frames = sum(step.frames for step in PLAN.steps)
+    assert needed == 2 * camera.width_px * camera.height_px * frames
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=needed - 1))
+    with pytest.raises(InputError, match=r"keep_frames: the frames need .* GB, and .* GB free"):
+        kept_frames.require_room(PLAN, loaded, tmp_path / "not yet" / "run")
+
+
+def test_a_file_is_written_whole_or_its_old_self_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "fit.json"
+    write_whole(path, "old")
+
+    def full(number: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(StorageError, match=r"fit\.json: the disk is full .*make room"):
+        write_whole(path, "new")
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["fit.json"]
