@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from instrument.errors import GonioError, OperatorStop, StorageError
-from instrument.text.terminal_safe import harmless
+from instrument.text.terminal_safe import escape_control_characters
 
 # The program's arrays are small: threads of the linear algebra would only wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -210,10 +210,10 @@ def _do(command: str, *arguments: object, module: str = "acquisition.commands.sc
     try:
         getattr(importlib.import_module(module), command)(*arguments)
     except GonioError as error:
-        sys.stderr.write(f"{harmless(str(error))}\n")
+        sys.stderr.write(f"{escape_control_characters(str(error))}\n")
         raise typer.Exit(error.exit_code) from None
     except OSError as error:
-        sys.stderr.write(f"{harmless(str(error))}\n")
+        sys.stderr.write(f"{escape_control_characters(str(error))}\n")
         raise typer.Exit(StorageError.exit_code) from None
     except KeyboardInterrupt:
         sys.stderr.write("stopped by the operator\n")

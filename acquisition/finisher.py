@@ -9,7 +9,7 @@ from pathlib import Path
 from acquisition.afterwards import GO
 from acquisition.commands.scan import report_run
 from instrument.errors import GonioError
-from instrument.text.terminal_safe import harmless
+from instrument.text.terminal_safe import escape_control_characters
 
 NEEDED = ("acquisition.results.finish", "matplotlib.figure", "matplotlib.backends.backend_svg")
 
@@ -23,7 +23,7 @@ def main() -> None:
     try:
         report_run(Path(sys.argv[1]), sys.argv[2] == "json")
     except GonioError as error:
-        sys.stderr.write(f"{harmless(str(error))}\n")
+        sys.stderr.write(f"{escape_control_characters(str(error))}\n")
         sys.exit(error.exit_code)
 
 

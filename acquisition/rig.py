@@ -12,7 +12,7 @@ from drivers.manual import HandCoveredLamp, HandSetAxis
 from instrument.clock import Clock, SystemClock
 from instrument.closeable import Closing
 from instrument.config.axes import AXES, HandAxis, SimulatedAxis, Wired
-from instrument.config.camera import V4l2Camera
+from instrument.config.camera import V4l2CameraConfig
 from instrument.config.load import Loaded
 from instrument.config.rig import Rig
 from instrument.devices import Camera, Lamp, Operator, Stage
@@ -93,7 +93,7 @@ class Bench(Closing):
 
     def camera(self) -> Camera:
         """The camera, open."""
-        if isinstance(self._rig.camera, V4l2Camera):
+        if isinstance(self._rig.camera, V4l2CameraConfig):
             from drivers.factory import open_camera
 
             settings = self._rig.camera

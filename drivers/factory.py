@@ -10,7 +10,7 @@ from drivers.stages.motor_stage import Limits, MotorStage
 from instrument.clock import Clock
 from instrument.closeable import Closing
 from instrument.config.axes import NewportAxis, OrientalAxis, Wired, ZaberAxis
-from instrument.config.camera import V4l2Camera
+from instrument.config.camera import V4l2CameraConfig
 from instrument.devices import Camera
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def _limits(axis: Wired) -> Limits:
     )
 
 
-def open_camera(camera: V4l2Camera, device: str, clock: Clock) -> Camera:
+def open_camera(camera: V4l2CameraConfig, device: str, clock: Clock) -> Camera:
     """The camera. Raises `DeviceError` where it cannot do what the rig file asks for."""
     from drivers.v4l2.camera import V4l2Camera as Driver
     from drivers.v4l2.camera import V4l2Settings

@@ -23,13 +23,15 @@ stands at azimuth -dphi, so that phi_r - phi_i = dphi.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 _RADIANS = np.pi / 180  # a product with it is np.radians to the last bit, in a fifth of the time
 
@@ -150,3 +152,7 @@ def camera_to_lamp_deg(
 def cone_half_angle_deg(solid_angle_sr: float) -> float:
     """Half-angle of the circular cone of that solid angle: Omega = 2 pi (1 - cos a)."""
     return float(np.degrees(np.arccos(1.0 - solid_angle_sr / (2.0 * np.pi))))
+
+
+Brdf = Callable[[Geometry], FloatArray]
+"""Function that gives a BRDF in 1/sr, of the shape of the geometry's angles."""

@@ -17,9 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from instrument.geometry import FloatArray, Geometry
-
-Brdf = Callable[[Geometry], FloatArray]
+from instrument.geometry import Brdf, FloatArray, Geometry
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,7 +43,7 @@ class Bench:
 
 
 @dataclass(frozen=True, slots=True)
-class Left:
+class BenchFiles:
     """The files that a bench left."""
 
     folder: Path

@@ -15,7 +15,7 @@ from pathlib import Path
 from acquisition.afterwards import Afterwards
 from acquisition.commands.scan_session import scan
 from acquisition.engine.frame_files import require_room
-from acquisition.engine.resume import SoFar
+from acquisition.engine.resume import Progress
 from acquisition.plan.moves import home_pose, moves_between
 from acquisition.plan.plan import Plan, make_plan
 from acquisition.results.model_check import check_model
@@ -50,9 +50,9 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
     """Go on with a stopped run; a finished one is fitted and reported again."""
     with Record.open(folder) as record:
         _write_inputs(record)
-        loaded = as_used(record)
+        loaded = load_run_inputs(record)
         plan = make_plan(loaded)
-        so_far = SoFar(tuple(record.readings()), tuple(record.checks()))
+        so_far = Progress(tuple(record.readings()), tuple(record.checks()))
         missing = so_far.missing(plan)
         if missing:
             moves_between(home_pose(loaded.rig), missing[0].pose, loaded.rig)  # or nothing moves
@@ -66,7 +66,7 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
 def report_run(folder: Path, as_json: bool) -> None:
     """Fit a run again and write its tables and report anew; touches no device."""
     with Record.open(folder) as record:
-        _finish(record, as_used(record), as_json)
+        _finish(record, load_run_inputs(record), as_json)
 
 
 def show_plan(protocol_path: Path, rig_path: Path | None, as_json: bool) -> None:
@@ -134,7 +134,7 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def as_used(record: Record) -> Loaded:
+def load_run_inputs(record: Record) -> Loaded:
     """The run's own copies of protocol and rig; `InputError` when they are not as they were."""
     folder = record.folder
     loaded = load_protocol(folder / PROTOCOL_FILE, folder / RIG_FILE, check_model=check_model)

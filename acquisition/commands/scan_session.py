@@ -6,8 +6,8 @@ from collections.abc import Callable
 from contextlib import closing
 
 from acquisition.engine.engine import Devices, Engine
-from acquisition.engine.event_log import Noted, noted
-from acquisition.engine.resume import SoFar
+from acquisition.engine.event_log import EventLogHandler, noted
+from acquisition.engine.resume import Progress
 from acquisition.plan.plan import Plan, Step
 from acquisition.rig import open_devices
 from acquisition.terminal.console import console, duration_text, progress
@@ -17,7 +17,7 @@ from instrument.errors import DeviceError, OperatorStop, StorageError
 from instrument.record.record import Record
 
 
-def scan(loaded: Loaded, plan: Plan, record: Record, so_far: SoFar | None = None) -> None:
+def scan(loaded: Loaded, plan: Plan, record: Record, so_far: Progress | None = None) -> None:
     """Run the plan, or what is missing of it; the caller has claimed the run.
 
     Raises `OperatorStop`, `DeviceError` or `StorageError` with the command that goes on.
@@ -45,11 +45,11 @@ def _drive(
     loaded: Loaded,
     plan: Plan,
     record: Record,
-    so_far: SoFar | None,
+    so_far: Progress | None,
     devices: Devices,
-    notes: Noted,
+    notes: EventLogHandler,
 ) -> None:
-    clock, before = devices.clock, so_far or SoFar()
+    clock, before = devices.clock, so_far or Progress()
     begun_s = clock.now_s() - before.elapsed_s
     console.print(
         f"{loaded.protocol.name}: {len(plan.points)} geometries, about "
@@ -67,7 +67,7 @@ def _drive(
     console.print(_unsafe(notes), end="", highlight=False, soft_wrap=True)
 
 
-def _both(show: Callable[[Step], None], notes: Noted) -> Callable[[Step], None]:
+def _both(show: Callable[[Step], None], notes: EventLogHandler) -> Callable[[Step], None]:
     def on_step(step: Step) -> None:
         notes.write()
         show(step)
@@ -75,7 +75,7 @@ def _both(show: Callable[[Step], None], notes: Noted) -> Callable[[Step], None]:
     return on_step
 
 
-def _write_down(record: Record, notes: Noted, clock: Clock, kind: str, why: str) -> None:
+def _write_down(record: Record, notes: EventLogHandler, clock: Clock, kind: str, why: str) -> None:
     """Note why a scan ended; where the disk takes nothing more, the message alone has to tell."""
     try:
         notes.write()
@@ -84,7 +84,7 @@ def _write_down(record: Record, notes: Noted, clock: Clock, kind: str, why: str)
         return
 
 
-def _go_on(record: Record, notes: Noted) -> str:
+def _go_on(record: Record, notes: EventLogHandler) -> str:
     """What is not safe, what is, and the command that goes on."""
     where = record.where()
     if where is None:
@@ -93,6 +93,6 @@ def _go_on(record: Record, notes: Noted) -> str:
     return f"{_unsafe(notes)}{safe}. Go on with: gonio resume {where}"
 
 
-def _unsafe(notes: Noted) -> str:
+def _unsafe(notes: EventLogHandler) -> str:
     """What a person has to see to, a line each; nothing where all is well."""
     return "".join(f"LOOK AT THE RIG FIRST: {text}\n" for text in notes.troubles)

@@ -15,8 +15,8 @@ from acquisition.engine.exposer import Exposed, Exposer
 from acquisition.engine.frame_files import keep
 from acquisition.engine.positioner import Positioner
 from acquisition.engine.preview import preview_of
-from acquisition.engine.resume import SoFar, describe
-from acquisition.engine.retrying_camera import PatientCamera
+from acquisition.engine.resume import Progress, describe
+from acquisition.engine.retrying_camera import RetryingCamera
 from acquisition.measure.radiometry import Signal, measure
 from acquisition.measure.window import Window, window_at
 from acquisition.plan.moves import NoPathError
@@ -64,10 +64,10 @@ class Engine:
         self._pinhole = Pinhole.of(rig)
         self._ended = False
         self._hands = Positioner(rig, devices.axes, devices.lamp, devices.operator, self._answered)
-        camera = PatientCamera(devices.camera)
+        camera = RetryingCamera(devices.camera)
         self._exposer = Exposer(camera, devices.lamp, devices.clock, protocol, rig, record)
 
-    def run(self, plan: Plan, so_far: SoFar | None = None) -> None:
+    def run(self, plan: Plan, so_far: Progress | None = None) -> None:
         """Run all steps, or those that are missing `so_far` of a scan that was stopped.
 
         Leaves a safe rig behind, whatever happens, and refuses (`DeviceError`) to run again.
@@ -114,7 +114,7 @@ class Engine:
         self._exposer.start(0.0)
         self._exposer.take_darks(plan.darks_first_s)
 
-    def _go_on(self, plan: Plan, so_far: SoFar) -> None:
+    def _go_on(self, plan: Plan, so_far: Progress) -> None:
         """Bring the rig where the scan stood, look whether the lamp is what it was."""
         first = so_far.missing(plan)[0]
         self._hands.find()
@@ -132,7 +132,7 @@ class Engine:
         if self._rig.lamp.darkened_by == "shutter":
             self._devices.lamp.light()
 
-    def _check_drift(self, plan: Plan, so_far: SoFar, first: Step) -> None:
+    def _check_drift(self, plan: Plan, so_far: Progress, first: Step) -> None:
         """Measure the drift reference again, if the scan has one to compare with."""
         repeated = so_far.drift_step(plan, first.block)
         if repeated is None:

@@ -18,7 +18,7 @@ SPEAKERS = ("drivers", "acquisition", "sim")
 RETRY, TROUBLE = "retry", "trouble"
 
 
-class Noted(logging.Handler):
+class EventLogHandler(logging.Handler):
     """Keeps what is logged until `write` puts it into the record: its level says what it is.
 
     `troubles`: what a person has to be told as well.
@@ -49,9 +49,9 @@ class Noted(logging.Handler):
 
 
 @contextmanager
-def noted(record: Record) -> Iterator[Noted]:
+def noted(record: Record) -> Iterator[EventLogHandler]:
     """Listen to all drivers for a while."""
-    handler = Noted(record)
+    handler = EventLogHandler(record)
     speakers = [logging.getLogger(name) for name in SPEAKERS]
     for speaker in speakers:
         speaker.addHandler(handler)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from acquisition.engine.retrying_camera import PatientCamera
+from acquisition.engine.retrying_camera import RetryingCamera
 from acquisition.measure.radiometry import Dark, bright_level, dark_of
 from acquisition.measure.window import Window
 from acquisition.plan.exposure_ladder import NEARLY_FULL, longest_below
@@ -42,7 +42,7 @@ class Exposed:
 class Exposer:
     """Chooses exposures and keeps the darks; every dark is in the record."""
 
-    camera: PatientCamera
+    camera: RetryingCamera
     lamp: Lamp
     clock: Clock
     protocol: Protocol

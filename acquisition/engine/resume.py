@@ -11,7 +11,7 @@ from instrument.record.reading import Check, Reading
 
 
 @dataclass(frozen=True, slots=True)
-class SoFar:
+class Progress:
     """What a stopped scan has on disk: its readings in the plan's order, its earlier checks."""
 
     readings: tuple[Reading, ...] = ()

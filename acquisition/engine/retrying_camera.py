@@ -16,7 +16,7 @@ TRIES = 4  # the camera's own driver looks for it for two seconds at each
 T = TypeVar("T")
 
 
-class PatientCamera:
+class RetryingCamera:
     """Asks up to `TRIES` times a call; each further try is logged, and so in the record.
 
     A camera that comes back has been set as before by its driver, or it raises another error. A

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data.measurements import IntArray
-from instrument.geometry import FloatArray
+from instrument.geometry import FloatArray, IntArray
 from instrument.record.reading import Check, Reading
 
 LEAST_SIGNAL_U = 10.0  # a check with less signal than this many u follows noise and not the lamp

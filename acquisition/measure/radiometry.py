@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from acquisition.measure.window import Window
 from acquisition.plan.exposure_ladder import NEARLY_FULL
-from instrument.config.camera import Camera
+from instrument.config.camera import CameraConfig
 from instrument.devices import Frame, Image
-from instrument.geometry import FloatArray
+from instrument.geometry import FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Signal:
     flags: str
 
 
-def dark_of(frames: Sequence[Frame], camera: Camera) -> Dark:
+def dark_of(frames: Sequence[Frame], camera: CameraConfig) -> Dark:
     """The dark of a series of frames taken without light."""
     mean, variance = _mean_and_variance([frame.image for frame in frames], camera)
     return Dark(frames[0].exposure_s, mean, variance, len(frames))
@@ -61,7 +61,7 @@ def measure(
     frames: Sequence[Frame],
     dark: Dark,
     window: Window,
-    camera: Camera,
+    camera: CameraConfig,
     u_placement_mm: float,
     min_pixels: int,
 ) -> Signal:
@@ -84,7 +84,9 @@ def measure(
     )
 
 
-def _mean_and_variance(images: Sequence[Image], camera: Camera) -> tuple[FloatArray, FloatArray]:
+def _mean_and_variance(
+    images: Sequence[Image], camera: CameraConfig
+) -> tuple[FloatArray, FloatArray]:
     """Mean and variance from frame to frame of every pixel, DN and DN^2.
 
     Sums of counts and of their squares are whole numbers far below 2^53, so nothing is rounded.
@@ -107,7 +109,7 @@ def _noise(window: Window, variance: FloatArray) -> float:
     return float(np.sqrt(np.sum(window.weights**2 * variance)))
 
 
-def _rounding(level_dn: float, camera: Camera) -> float:
+def _rounding(level_dn: float, camera: CameraConfig) -> float:
     """Standard uncertainty that rounding to whole counts leaves in a mean of that level, DN.
 
     The noise that dithers it is the rig file's: that of the counts contains the rounding itself.
@@ -115,7 +117,7 @@ def _rounding(level_dn: float, camera: Camera) -> float:
     return rounding_u_dn(float(_photon_transfer(np.asarray(level_dn), camera)))
 
 
-def _photon_transfer(mean: FloatArray, camera: Camera) -> FloatArray:
+def _photon_transfer(mean: FloatArray, camera: CameraConfig) -> FloatArray:
     """Variance of a pixel before rounding, DN^2: photons and read noise of the rig file."""
     gain = camera.electrons_per_dn
     electrons = np.maximum(mean - camera.black_level_dn, 0.0) * gain
@@ -163,12 +165,14 @@ def _placement(
     return -part * (after - before) / 2, part**2 * np.sqrt(3) * abs(after + before - 2 * here) / 2
 
 
-def _moved(crop: tuple[slice, slice], by: NDArray[np.int64]) -> tuple[slice, slice]:
+def _moved(crop: tuple[slice, slice], by: IntArray) -> tuple[slice, slice]:
     rows, columns = (slice(s.start + n, s.stop + n) for s, n in zip(crop, by.tolist(), strict=True))
     return rows, columns
 
 
-def _flags(window: Window, min_pixels: int, saturated: int, peak_dn: float, camera: Camera) -> str:
+def _flags(
+    window: Window, min_pixels: int, saturated: int, peak_dn: float, camera: CameraConfig
+) -> str:
     """What is wrong with the reading, separated by semicolons; empty when nothing is."""
     flags = {
         "window leaves frame": not window.inside_frame,

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from instrument.geometry import FloatArray
+from instrument.geometry import BoolArray, FloatArray
 from instrument.pinhole import Pinhole, apply_homography, area_per_pixel_mm2, rectangle_mm
 from instrument.pixel_coverage import polygon_coverage
 
@@ -34,7 +33,7 @@ class Window:
 
     crop: tuple[slice, slice]
     weights: FloatArray
-    counted: NDArray[np.bool_]
+    counted: BoolArray
     outline_px: FloatArray
     pixels: float
     inside_frame: bool

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from instrument.config.camera import Camera
+from instrument.config.camera import CameraConfig
 from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
 
@@ -15,7 +15,7 @@ STEP = math.sqrt(2.0)
 NEARLY_FULL = 0.97  # of full scale: beyond this the response is not trusted
 
 
-def exposure_ladder_s(camera: Camera) -> tuple[float, ...]:
+def exposure_ladder_s(camera: CameraConfig) -> tuple[float, ...]:
     """Every exposure that is ever used, in seconds: the camera's shortest times powers of sqrt 2.
 
     Rounded to the camera's own steps, or to six digits, so that the same exposure always is the
@@ -28,7 +28,7 @@ def exposure_ladder_s(camera: Camera) -> tuple[float, ...]:
     return tuple(dict.fromkeys(float(f"{e:.6g}") for e in exact))
 
 
-def longest_below(limit_s: float, camera: Camera) -> float:
+def longest_below(limit_s: float, camera: CameraConfig) -> float:
     """The longest exposure of the ladder up to `limit_s`, or the shortest there is."""
     ladder = exposure_ladder_s(camera)
     return max((e for e in ladder if e <= limit_s * (1 + 1e-9)), default=ladder[0])

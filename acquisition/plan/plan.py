@@ -14,7 +14,7 @@ from acquisition.plan.exposure_ladder import expected_exposure_s, exposure_ladde
 from acquisition.plan.moves import Move, NoPathError, Pose, home_pose, moves_between
 from instrument.config.axes import AXES, HandAxis
 from instrument.config.load import Loaded
-from instrument.config.protocol import Protocol, Sweep, angles_deg
+from instrument.config.protocol import Protocol, SweepConfig, angles_deg
 from instrument.config.rig import Rig
 from instrument.config.yaml_positions import place
 from instrument.devices import Surface
@@ -91,7 +91,7 @@ def hidden_below_deg(rig: Rig) -> float:
     return max(rig.blocked_half_angle_deg or 0.0, sum(map(cone_half_angle_deg, cones)))
 
 
-def sweep_poses(sweep: Sweep, rig: Rig) -> list[Pose]:
+def sweep_poses(sweep: SweepConfig, rig: Rig) -> list[Pose]:
     """All poses of one sweep: slowest axis first as written, hand-set axes before motors."""
     names = [key.removesuffix("_deg") for key in sweep]
     names.sort(key=lambda name: not isinstance(rig.axes[name], HandAxis))

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition.results.reduction import Reduced, root_sum_square
 from analysis.choice.choice import Choice, choose
@@ -15,7 +14,7 @@ from analysis.data.measurements import Measurements
 from analysis.fit.fit import FitResult, stated_u
 from instrument.config.load import Loaded
 from instrument.errors import NotDetermined
-from instrument.geometry import FloatArray
+from instrument.geometry import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +22,7 @@ class Fitted:
     """The choice, or None and the reason why there is none; `used` marks the fitted points (N,)."""
 
     choice: Choice | None
-    used: NDArray[np.bool_]
+    used: BoolArray
     reason: str
 
     @property

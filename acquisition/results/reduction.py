@@ -11,12 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition.measure.drift import Drift, rate
 from analysis.data.measurements import SharedError
 from instrument.config.protocol import Protocol
-from instrument.geometry import FloatArray
+from instrument.geometry import BoolArray, FloatArray
 from instrument.record.reading import Check, Reading
 
 NOISE, ROUNDING, DRIFT = "photon and read noise", "rounding to counts", "lamp drift"
@@ -61,7 +60,7 @@ class Reduced:
         return np.abs(self.radiance) * root_sum_square(own)
 
     @property
-    def sound(self) -> NDArray[np.bool_]:
+    def sound(self) -> BoolArray:
         """Points that may enter a fit: nothing flagged, and measured against a tile if any was."""
         unflagged = np.array([not flags for flags in self.flags], dtype=bool)
         return unflagged & np.isfinite(self.brdf if self.has_brdf else self.radiance)

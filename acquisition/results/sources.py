@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.commands.scan import as_used
+from acquisition.commands.scan import load_run_inputs
 from acquisition.results.fitting import measurements
 from acquisition.results.reduction import reduce
 from analysis.data.acceptance import Acceptance
@@ -86,7 +86,7 @@ def _kind(path: Path) -> str:
 
 def _run(path: Path) -> Source:
     with Record.open(path) as record:
-        loaded = as_used(record)
+        loaded = load_run_inputs(record)
         reduced = reduce(record.readings(), loaded.protocol)
     if not np.any(reduced.sound):
         raise NotDetermined(f"{path}: no geometry has been measured yet that could be fitted")

@@ -14,7 +14,7 @@ from rich.text import Text
 from acquisition.engine.frame_files import kept_bytes
 from acquisition.plan.plan import Plan, Step, lamp_settings
 from instrument.config.load import Loaded
-from instrument.text.terminal_safe import harmless
+from instrument.text.terminal_safe import escape_control_characters
 
 if TYPE_CHECKING:
     from acquisition.results.finish import Outcome
@@ -25,7 +25,7 @@ class _Harmless(Console):
 
     def render_str(self, text: str, **how: Any) -> Text:
         """Text for the terminal."""
-        return super().render_str(harmless(text), **how)
+        return super().render_str(escape_control_characters(text), **how)
 
 
 # Progress and prompts go to standard error: standard output may be JSON.

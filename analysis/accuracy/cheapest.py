@@ -29,7 +29,7 @@ from analysis.accuracy.method import Method, Physics, Ranges
 from analysis.accuracy.methods_lobe import LOBE_OF_WAVES
 from analysis.accuracy.methods_smooth import SMOOTH_BODY
 from analysis.accuracy.rough_surface import ROUGH_SURFACE
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import BoolArray, FloatArray, Geometry
 
 PHYSICS = {p.name: p for p in (ROUGH_SURFACE, SMOOTH_BODY, LOBE_OF_WAVES)}
 
@@ -121,7 +121,7 @@ class _Off(NamedTuple):
     most: FloatArray
     axes: dict[str, list[float]]
 
-    def about(self, above: NDArray[np.bool_]) -> Ranges:
+    def about(self, above: BoolArray) -> Ranges:
         """The ranges that hold the marked parameters (...,) and those next to them."""
         held = {}
         for k, (name, values) in enumerate(self.axes.items()):
@@ -196,7 +196,7 @@ class _Scene:
             so_far = max(so_far, float(found.least.max()))
             if self._broken(doubtful, found):
                 return None
-            above: NDArray[np.bool_] = np.asarray(found.most > self.tolerance[doubtful])
+            above: BoolArray = np.asarray(found.most > self.tolerance[doubtful])
             doubtful = doubtful[above.any(axis=tuple(range(above.ndim - 1)))]
             if not doubtful.size:
                 return so_far

@@ -6,14 +6,14 @@ What to use when: `adequate_brdf` for a model whose values are drawn, not fitted
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from analysis.accuracy.cheapest import cheapest
 from analysis.models import MODELS
 from analysis.models.rough.form_error import LIMIT_DEG
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import Brdf, FloatArray, Geometry
 
 TOLERANCE = 3e-5
 """Relative, of each term: below a tenth of the noise of a window's mean (a few 1e-4), and a third
@@ -29,8 +29,6 @@ NEAR_GRAZING = 2e-4
 
 _METHODS = ("table", "coarse", "exact")  # no form keeps TOLERANCE on a surface that is not a plane
 _CHECKS = 64  # geometries with which a doubt may be settled: pictures are too many to spend more
-
-Brdf = Callable[[Geometry], FloatArray]
 
 
 def adequate_brdf(name: str, parameters: Mapping[str, float], tolerance: float = TOLERANCE) -> Brdf:

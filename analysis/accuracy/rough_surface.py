@@ -55,7 +55,7 @@ def map_bound(name: str, geometry: Geometry, ranges: Ranges) -> FloatArray:
     return np.where(larger > LIMIT_DEG, np.inf, bound)
 
 
-def closer_bound(model: str, geometry: Geometry, ranges: Ranges) -> FloatArray:
+def tight_bound(model: str, geometry: Geometry, ranges: Ranges) -> FloatArray:
     """The same of a printed form, from its departure from the table: (N,).
 
     What the table itself may be off comes on top, and what the departure may do between the
@@ -89,7 +89,7 @@ def _form(
     kernel: Callable[..., FloatArray],
     *cost: *tuple[float, float, float, float],
 ) -> Method:
-    closer = partial(closer_bound, model)
+    closer = partial(tight_bound, model)
     return Method(name, kernel, partial(map_bound, name), priced(*cost), closer)
 
 

@@ -11,10 +11,10 @@ from analysis.accuracy.cheapest import PHYSICS, cheapest
 from analysis.choice.ladder import SAME_PREDICTION, approximation
 from analysis.data.acceptance import Acceptance
 from analysis.data.measurements import Measurements
-from analysis.fit.first_fit import FirstFit, deepened, determined, quick_fit
+from analysis.fit.first_fit import FirstFit, determined, multi_start, quick_fit
 from analysis.fit.fit import FitResult, refined
 from analysis.fit.relative_scale import NAME as RELATIVE_FACTOR
-from analysis.fit.relative_scale import levelled
+from analysis.fit.relative_scale import normalise_lamp_levels
 from analysis.models import MODELS
 from instrument.errors import NotDetermined
 
@@ -50,7 +50,7 @@ class Candidates:
                 f"{measurements.size} points are too few to fit any of: {', '.join(names)}"
             )
         if measurements.free_levels:
-            level = levelled(measurements, _best(found.first).brdf)
+            level = normalise_lamp_levels(measurements, _best(found.first).brdf)
             return cls(level, robust, every).with_more(names)
         return found
 
@@ -65,7 +65,7 @@ class Candidates:
                 quick[model.name] = quick_fit(model, m)
         best = _best(quick.values()) if quick else None
         first = tuple(
-            f if best is None or _hopeless(f, best, m) else deepened(f, m, self.robust)
+            f if best is None or _ruled_out(f, best, m) else multi_start(f, m, self.robust)
             for f in quick.values()
         )
         few = tuple(model.name for model in named if not determined(model, m))
@@ -75,7 +75,7 @@ class Candidates:
         """Each fitted with all uncertainties, around the smooth curve of the best one."""
         m, best = self.measurements, _best(self.first)
         return tuple(
-            refined(f, m, acceptance, best.brdf, _hopeless(f, best, m)) for f in self.first
+            refined(f, m, acceptance, best.brdf, _ruled_out(f, best, m)) for f in self.first
         )
 
 
@@ -102,7 +102,7 @@ def _leaves_integral(form: FirstFit, measurements: Measurements) -> bool:
     return found.method != "functional"
 
 
-def _hopeless(fit: FirstFit, best: FirstFit, m: Measurements) -> bool:
+def _ruled_out(fit: FirstFit, best: FirstFit, m: Measurements) -> bool:
     """Whether neither averaging over the rig nor another basin can bring a model near the best."""
     enough = 0.0 if m.u_random is None else float(m.size)
     return fit.solution.chi2 > _HOPELESS * max(best.solution.chi2, enough)

@@ -8,13 +8,11 @@ few points in it, do not decide alone.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.data.measurements import Measurements
 from analysis.data.sweeps import signed_view
 from analysis.fit.problem import Problem
-from analysis.models.base import BoolArray
-from instrument.geometry import FloatArray
+from instrument.geometry import BoolArray, FloatArray, IntArray
 
 MOST_FOLDS = 5
 _LEAST_INCIDENCES = 3
@@ -41,7 +39,7 @@ def _blocks(values: FloatArray) -> list[BoolArray]:
     known, member, count = np.unique(values, return_inverse=True, return_counts=True)
     number = min(MOST_FOLDS, known.size)
     middle = np.cumsum(count) - count / 2
-    block: NDArray[np.int64] = np.floor(middle * number / values.size).astype(np.int64)
+    block: IntArray = np.floor(middle * number / values.size).astype(np.int64)
     found = [block[member.reshape(-1)] == n for n in range(number)]
     return [points for points in found if np.any(points)]
 

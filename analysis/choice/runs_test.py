@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtr
 
-from analysis.data.measurements import IntArray, Measurements
+from analysis.data.measurements import Measurements
 from analysis.data.sweeps import Sweep, in_plane, sweeps
-from instrument.geometry import FloatArray
+from instrument.geometry import FloatArray, IntArray
 
 # A stretch counts as a failure from this many standard deviations of its mean.
 _NOTABLE = 3.0

@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
-from analysis.data.covariance import Brdf, Covariance, change, shared, with_column
-from analysis.data.measurements import IntArray, Measurements
+from analysis.data.covariance import Covariance, change, shared, with_column
+from analysis.data.measurements import Measurements
 from analysis.data.sweeps import in_plane, sweeps
+from instrument.geometry import Brdf, IntArray
 
 # A difference less probable than this is one of the surface.
 UNLIKELY = 1e-3

@@ -12,27 +12,27 @@ that each part of it gives an irradiance that goes as cos(local theta_i) / dista
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from instrument.geometry import (
+    Brdf,
     FloatArray,
     Geometry,
+    IntArray,
     camera_direction,
     cone_half_angle_deg,
     lamp_direction,
 )
 
 if TYPE_CHECKING:
-    from instrument.config.protocol import Window
+    from instrument.config.protocol import PatchConfig
     from instrument.config.rig import Rig
 
-Brdf = Callable[[Geometry], FloatArray]
 
 MOST_RINGS = 6
 
@@ -66,7 +66,7 @@ class Acceptance:
             _require(name, getattr(self, name) >= 0, getattr(self, name), "0 mm or more")
 
     @classmethod
-    def of(cls, rig: Rig, window: Window) -> Acceptance:
+    def of(cls, rig: Rig, window: PatchConfig) -> Acceptance:
         """Acceptance of a rig file and of the window that a protocol measures."""
         return cls(
             rig.beam_length_mm,
@@ -176,7 +176,7 @@ def rings_each(
     *,
     tolerance: ArrayLike = 1e-4,
     most: int = MOST_RINGS,
-) -> NDArray[np.int64]:
+) -> IntArray:
     """The smallest number of rings, geometry by geometry, that one more changes too little.
 
     Too little is a change of the averaged BRDF by less than `tolerance`, relative, which

@@ -8,18 +8,14 @@ generalised least squares).
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, hstack
 
-from analysis.data.measurements import IntArray, Measurements
-from instrument.geometry import FloatArray, Geometry
-
-Brdf = Callable[[Geometry], FloatArray]
+from analysis.data.measurements import Measurements
+from instrument.geometry import BoolArray, Brdf, FloatArray, Geometry, IntArray
 
 LAMP_LEVEL = "lamp level"
 Columns = FloatArray | csr_array
@@ -80,7 +76,7 @@ class Covariance:
         """
         return np.asarray(self._own.T @ self._unshared(self.whiten(residual)))
 
-    def of(self, points: NDArray[np.bool_]) -> Covariance:
+    def of(self, points: BoolArray) -> Covariance:
         """Covariance of some of the points (N,)."""
         return Covariance(self.variance[points], self.common[points], self.names)
 
@@ -160,7 +156,7 @@ def shared(
     ]
     if m.free_levels:
         groups.append((LAMP_LEVEL, _ANY_LEVEL * f, m.lamp_setting))
-    bends = [_bend(m, smooth, **angle) for angle in (view, incidence, azimuth)]
+    bends = [_second_order_u(m, smooth, **angle) for angle in (view, incidence, azimuth)]
     variance = np.square(m.u_random) + np.sum(np.square(bends), axis=0)
     columns, names = [], []
     for name, shift, group in groups:
@@ -170,7 +166,7 @@ def shared(
         names += [f"{name}{label}" for label in labels]
     common = csr_array(hstack(columns))
     few = common.shape[0] * common.shape[1] <= _MOST_FULL
-    return Covariance(variance, common.toarray() if few else common, _told_apart(names))
+    return Covariance(variance, common.toarray() if few else common, _numbered(names))
 
 
 def _columns(
@@ -195,7 +191,7 @@ def _columns(
     return np.where(alone, shift, 0.0), columns, labels
 
 
-def _told_apart(names: list[str]) -> tuple[str, ...]:
+def _numbered(names: list[str]) -> tuple[str, ...]:
     """Names that stand several times get a number each."""
     seen: dict[str, int] = {}
     apart, often = [], Counter(names)
@@ -218,7 +214,7 @@ def change(m: Measurements, smooth: Brdf, **angle: float) -> FloatArray:
     return np.asarray((smooth(up) - smooth(down)) / (up_step + down_step))
 
 
-def _bend(m: Measurements, smooth: Brdf, **angle: float) -> FloatArray:
+def _second_order_u(m: Measurements, smooth: Brdf, **angle: float) -> FloatArray:
     """What a straight line leaves of an angle's error, (N,): its u by the next term of the series.
 
     A normal error of u adds (d2f/dx2) u^2 / 2 times a square of mean square 3 (GUM, 5.1.2, note).

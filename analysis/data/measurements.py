@@ -11,11 +11,9 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from instrument.geometry import FloatArray, Geometry
-
-IntArray = NDArray[np.int64]
+from instrument.geometry import BoolArray, FloatArray, Geometry, IntArray
 
 _ARRAYS = ("theta_i_deg", "theta_r_deg", "dphi_deg", "brdf", "u_random", "lamp_setting")
 
@@ -32,7 +30,7 @@ class SharedError:
     u_relative: FloatArray
     group: IntArray
 
-    def of(self, points: NDArray[np.bool_]) -> SharedError:
+    def of(self, points: BoolArray) -> SharedError:
         """The same error of some of the points (N,)."""
         return SharedError(self.name, self.u_relative[points], self.group[points])
 
@@ -127,7 +125,7 @@ class Measurements:
             lamp_setting=same_setting(theta_i, dphi),
         )
 
-    def of(self, points: NDArray[np.bool_]) -> Measurements:
+    def of(self, points: BoolArray) -> Measurements:
         """Some of the points (N,), with the errors that they share."""
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         chosen = {name: array[points] for name, array in arrays.items() if array is not None}

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data.measurements import IntArray, Measurements
-from instrument.geometry import FloatArray
+from analysis.data.measurements import Measurements
+from instrument.geometry import FloatArray, IntArray
 
 _DECIMALS = 3  # degrees that agree to this many are one setting
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.data.acceptance import Acceptance, averaged_brdf, rings_each
-from analysis.data.measurements import IntArray, Measurements
+from analysis.data.measurements import Measurements
 from analysis.fit.levenberg_marquardt import Minimum
 from analysis.fit.problem import Problem
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import FloatArray, Geometry, IntArray
 
 MOST_ROUNDS = 12
 

@@ -47,7 +47,7 @@ class FirstFit:
 
 def first_fit(model: Model, measurements: Measurements, robust: bool = False) -> FirstFit:
     """The deepest minimum with independent uncertainties. Raises `NotDetermined` as `fit` does."""
-    return deepened(quick_fit(model, measurements), measurements, robust)
+    return multi_start(quick_fit(model, measurements), measurements, robust)
 
 
 def quick_fit(model: Model, measurements: Measurements) -> FirstFit:
@@ -65,7 +65,7 @@ def quick_fit(model: Model, measurements: Measurements) -> FirstFit:
     return FirstFit(problem, solution, bic(measurements, problem, solution), tuple(others))
 
 
-def deepened(quick: FirstFit, m: Measurements, robust: bool = False) -> FirstFit:
+def multi_start(quick: FirstFit, m: Measurements, robust: bool = False) -> FirstFit:
     """The fit where it explains the data; else the deepest of all basins that have a start."""
     problem, best = quick.problem, quick.solution
     if problem.huber is not None:
@@ -76,11 +76,11 @@ def deepened(quick: FirstFit, m: Measurements, robust: bool = False) -> FirstFit
             break
         best = min(best, problem.solve(start), key=lambda found: (not found.converged, found.chi2))
     if robust:
-        problem, best = _made_robust(problem, best, m)
+        problem, best = _huber_refit(problem, best, m)
     return FirstFit(problem, best, bic(m, problem, best))
 
 
-def _made_robust(problem: Problem, solution: Minimum, m: Measurements) -> tuple[Problem, Minimum]:
+def _huber_refit(problem: Problem, solution: Minimum, m: Measurements) -> tuple[Problem, Minimum]:
     """The fit with Huber's loss; where no u is stated, the residuals' median gives the noise."""
     problem = replace(problem, huber=HUBER)
     for _ in range(_ROBUST_ROUNDS if m.u_random is None else 1):

@@ -12,18 +12,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.data.acceptance import Acceptance, Brdf
+from analysis.data.acceptance import Acceptance
 from analysis.data.covariance import Covariance, shared
 from analysis.data.measurements import Measurements
 from analysis.fit.acceptance_average import Averaged, average
 from analysis.fit.criteria import NOT_NORMAL, UNLIKELY, aicc, bic, noise_variance, probability
 from analysis.fit.first_fit import FirstFit, first_fit
 from analysis.fit.problem import Problem
-from analysis.fit.relative_scale import levelled, relative, untied
+from analysis.fit.relative_scale import normalise_lamp_levels, relative, unscaled_parameters
 from analysis.fit.uncertainty import uncertainty
 from analysis.models import MODELS, Model
-from analysis.models.base import BoolArray, Validity
-from instrument.geometry import FloatArray, Geometry
+from analysis.models.base import Validity
+from instrument.geometry import BoolArray, Brdf, FloatArray, Geometry
 
 UNSETTLED = "the averaging over lamp and lens did not settle"
 
@@ -103,7 +103,7 @@ def fit(
     """
     first = first_fit(model, measurements, robust)
     if measurements.free_levels:
-        measurements = levelled(measurements, first.brdf)
+        measurements = normalise_lamp_levels(measurements, first.brdf)
         first = first_fit(model, measurements, robust)
     return refined(first, measurements, acceptance, smooth or first.brdf)
 
@@ -177,7 +177,7 @@ def _result(m: Measurements, whole: Averaged, covariance: Covariance, hopeless: 
     problem, found = replace(whole.problem, covariance=covariance), whole.solution
     x = found.x
     noise = noise_variance(m, whole.problem, found)
-    free = untied(problem.model) if m.relative else frozenset[str]()
+    free = unscaled_parameters(problem.model) if m.relative else frozenset[str]()
     known = uncertainty(whole.problem, found, noise, free, profiles=not hopeless)
     predicted = problem.predict(x)
     residual = m.brdf - predicted

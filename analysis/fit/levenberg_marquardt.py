@@ -17,8 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.models.base import BoolArray
-from instrument.geometry import FloatArray
+from instrument.geometry import BoolArray, FloatArray
 
 HUBER = 1.345
 """Residuals beyond it, in units of u, count linearly: 95 % of the efficiency of least squares."""

@@ -6,12 +6,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.data.covariance import Covariance
 from analysis.fit.levenberg_marquardt import SETTLED, Minimum, descend, loss
 from analysis.models import Model
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import BoolArray, FloatArray, Geometry
 
 # How far off a bound that no slope leads away from a search goes on, as a part of the domain; what
 # it must lower chi2 by to count.
@@ -136,7 +135,7 @@ class Problem:
         )
         return found._replace(x=full(found.x))
 
-    def of(self, points: NDArray[np.bool_]) -> Problem:
+    def of(self, points: BoolArray) -> Problem:
         """The same problem of some of the points (N,)."""
         geometry = Geometry(
             self.geometry.theta_i_deg[points],

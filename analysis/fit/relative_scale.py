@@ -11,10 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.data.covariance import Brdf
 from analysis.data.measurements import Measurements
 from analysis.models import Model, Parameter
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import Brdf, FloatArray, Geometry
 
 NAME = "per_brdf"
 
@@ -24,7 +23,7 @@ _SPAN = 1e3
 _LEAST = 1e-6
 
 
-def levelled(m: Measurements, brdf: Brdf) -> Measurements:
+def normalise_lamp_levels(m: Measurements, brdf: Brdf) -> Measurements:
     """The measurements with each setting's level brought to that of a model near the data.
 
     What a level then still may be off is small, so that it is a shared error like any other.
@@ -39,7 +38,7 @@ def levelled(m: Measurements, brdf: Brdf) -> Measurements:
     return replace(m, brdf=m.brdf / level[settings], u_random=u)
 
 
-def untied(model: Model) -> frozenset[str]:
+def unscaled_parameters(model: Model) -> frozenset[str]:
     """The parameters of a relative model that nothing ties down."""
     return frozenset(p.name for p in model.parameters if p.scale or p.name == NAME)
 

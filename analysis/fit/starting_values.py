@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.fit.problem import Problem
 from analysis.models import Model, Parameter
-from instrument.geometry import FloatArray
+from instrument.geometry import BoolArray, FloatArray
 
 # A start lies off zero by this part of a scale's domain: at zero other parameters have no effect.
 _OFF_ZERO = 1e-3
@@ -132,7 +132,7 @@ def _solved(G: FloatArray, g: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(G + ridge, g[..., np.newaxis])[..., 0])
 
 
-def _local_minima(depth: FloatArray) -> NDArray[np.bool_]:
+def _local_minima(depth: FloatArray) -> BoolArray:
     """Where a grid's value is not above any neighbour's along the axes."""
     low = np.ones(depth.shape, dtype=bool)
     for axis in range(depth.ndim):

@@ -18,8 +18,7 @@ import numpy as np
 from analysis.fit.levenberg_marquardt import Minimum
 from analysis.fit.problem import Problem
 from analysis.fit.profile_likelihood import RISE_95, interval
-from analysis.models.base import BoolArray
-from instrument.geometry import FloatArray
+from instrument.geometry import BoolArray, FloatArray
 
 # Below this part of the largest singular value a combination of parameters is not determined.
 _RANK = 1e-7
@@ -47,18 +46,18 @@ def uncertainty(
     problem: Problem,
     best: Minimum,
     variance: float,
-    untied: Collection[str] = (),
+    unscaled_parameters: Collection[str] = (),
     profiles: bool = True,
 ) -> Uncertainty:
     """Uncertainties of the parameters at a minimum, in their own units.
 
     `variance` is that of the whitened residuals: 1 where the data's u is stated, else estimated.
-    `untied`: parameters that no reference ties down: not determined, whatever else may hint at
-    them. Without `profiles` an interval is the whole domain.
+    `unscaled_parameters`: parameters that no reference ties down, so not determined.
+    Without `profiles` an interval is the whole domain.
     """
     bound = (best.x == problem.low) | (best.x == problem.high)
     C, loose = _linear(problem, best.x, variance, ~bound)
-    loose |= [p.name in untied for p in problem.model.parameters]
+    loose |= [p.name in unscaled_parameters for p in problem.model.parameters]
     leaning = _leaning(problem, best.x, variance, C, bound)
     around = _Around(problem, best, variance, C, profiles)
     u: dict[str, float | None] = {}
@@ -69,7 +68,7 @@ def uncertainty(
         if ends is None:
             continue
         intervals[parameter.name] = ends
-        if parameter.name in untied or ends[1] - ends[0] > around.half(i):
+        if parameter.name in unscaled_parameters or ends[1] - ends[0] > around.half(i):
             undetermined.append(parameter.name)
     return Uncertainty(u, intervals, tuple(undetermined), _correlation(C, list(u.values())))
 

@@ -14,16 +14,14 @@ from typing import TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import BoolArray, FloatArray, Geometry
 
 Kernel = Callable[..., FloatArray]
 T = TypeVar("T", bound=FloatArray | tuple[FloatArray, ...])
 
 # Geometries in one block: a kernel's dozen arrays of them fit into a core's cache.
 BLOCK = 8192
-BoolArray = NDArray[np.bool_]
 
 
 def kept(function: Callable[[Geometry], T]) -> Callable[[Geometry], T]:

@@ -44,7 +44,7 @@ def eon_brdf(geometry: Geometry, albedo: float, roughness: float) -> FloatArray:
     return np.asarray((albedo * single + multiple) / np.pi)
 
 
-def eon_slopes(geometry: Geometry, albedo: float, roughness: float) -> dict[str, FloatArray]:
+def eon_gradient(geometry: Geometry, albedo: float, roughness: float) -> dict[str, FloatArray]:
     """Derivatives of `eon_brdf` by albedo and by roughness."""
     A = 1 / (1 + _C1 * roughness)
     s_over_t, shape = _s_over_t(geometry), _shape(geometry)
@@ -103,4 +103,4 @@ def _loss(theta: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(_C1 - G / np.pi, 0.0))
 
 
-EON = Model("eon", (ALBEDO, ROUGHNESS), eon_brdf, eon_slopes, eon_holds)
+EON = Model("eon", (ALBEDO, ROUGHNESS), eon_brdf, eon_gradient, eon_holds)

@@ -32,7 +32,7 @@ def minnaert_brdf(geometry: Geometry, albedo: float, k: float) -> FloatArray:
     return np.asarray(albedo * (k + 1) / (2 * np.pi) * np.power(_product(geometry), k - 1))
 
 
-def minnaert_slopes(geometry: Geometry, albedo: float, k: float) -> dict[str, FloatArray]:
+def minnaert_gradient(geometry: Geometry, albedo: float, k: float) -> dict[str, FloatArray]:
     """Derivatives of `minnaert_brdf` by albedo and by k."""
     product = _product(geometry)
     power = np.power(product, k - 1) / (2 * np.pi)
@@ -57,4 +57,4 @@ def _product(geometry: Geometry) -> FloatArray:
     return np.asarray(np.cos(geometry.theta_i) * np.cos(geometry.theta_r))
 
 
-MINNAERT = Model("minnaert", (ALBEDO, K), minnaert_brdf, minnaert_slopes, minnaert_holds)
+MINNAERT = Model("minnaert", (ALBEDO, K), minnaert_brdf, minnaert_gradient, minnaert_holds)

@@ -39,7 +39,7 @@ def single_scattering_brdf(geometry: Geometry, scattering: float, asymmetry: flo
     return np.asarray(scattering * phase / (4 * np.pi * cos_sum))
 
 
-def single_scattering_slopes(
+def single_scattering_gradient(
     geometry: Geometry, scattering: float, asymmetry: float
 ) -> dict[str, FloatArray]:
     """Derivatives of `single_scattering_brdf` by scattering and by asymmetry."""
@@ -77,6 +77,6 @@ SINGLE_SCATTERING = Model(
     "single_scattering",
     (SCATTERING, ASYMMETRY),
     single_scattering_brdf,
-    single_scattering_slopes,
+    single_scattering_gradient,
     single_scattering_holds,
 )

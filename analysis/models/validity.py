@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.models.base import BoolArray, Validity
-from instrument.geometry import FloatArray, Geometry
+from analysis.models.base import Validity
+from instrument.geometry import BoolArray, FloatArray, Geometry
 
 GRAZING = "lamp and camera both graze the surface, where the formula grows without limit"
 NEGATIVE = "negative as printed, far forward at high roughness"

@@ -6,12 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from instrument.geometry import FloatArray
+from instrument.geometry import BoolArray, FloatArray, IntArray
 from instrument.record.reading import Preview
 
-BoolArray = NDArray[np.bool_]
 Rows = tuple[tuple[str, str], ...]
 
 # BRDF in 1/sr of theta_i_deg, dphi_deg and an array of signed theta_r_deg.
@@ -197,7 +195,7 @@ def sweeps_of(data: ReportData) -> tuple[Sweep, ...]:
 def _sweep(
     data: ReportData,
     numbers: tuple[int, int],
-    at: NDArray[np.int64],
+    at: IntArray,
     dphi_deg: float,
     theta_r: FloatArray,
 ) -> Sweep:
@@ -238,7 +236,7 @@ def _folded(dphi_deg: FloatArray, theta_r_deg: FloatArray) -> tuple[FloatArray, 
     return np.where(other, around - 180.0, around), np.where(other, -theta_r_deg, theta_r_deg)
 
 
-def _settings(angle_deg: FloatArray, usable: BoolArray) -> NDArray[np.int64]:
+def _settings(angle_deg: FloatArray, usable: BoolArray) -> IntArray:
     """Number of the setting that each usable angle belongs to, from the smallest; -1 elsewhere."""
     at = np.flatnonzero(usable)
     at = at[np.argsort(angle_deg[at], kind="stable")]

@@ -59,7 +59,7 @@ def report_html(data: ReportData) -> str:
 
 
 def _text(words: str) -> str:
-    """Words from outside, harmless in HTML and in XML."""
+    """Words from outside, escape_control_characters in HTML and in XML."""
     visible = "".join(c if c.isprintable() or c in "\n\t\u00a0" else "\ufffd" for c in words)
     return html.escape(visible)
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, TypeVar
 from pymodbus.exceptions import ModbusException, ModbusIOException
 
 from drivers.lines.modbus_client import BusSettings, Client, client_for
-from drivers.lines.priority_lock import Turns
+from drivers.lines.priority_lock import PriorityLock
 from drivers.lines.serial_line import Garbled, NoReply, PortGone
 from instrument.closeable import Closing
 from instrument.errors import DeviceError
@@ -64,7 +64,7 @@ class ModbusBus(Closing):
 
     def __init__(self, who: str, settings: BusSettings) -> None:
         self.settings, self.port = settings, settings.port
-        self.turns = Turns()
+        self.turns = PriorityLock()
         self._tcp = settings.port.startswith("tcp://")
         self._client = client_for(settings)
         self._gone, self._closed = "", False

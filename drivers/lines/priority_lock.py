@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 
-class Turns:
+class PriorityLock:
     """A lock in two classes: whoever asks urgently is let in before those who only ask.
 
     The thread that has the turn may take it again.

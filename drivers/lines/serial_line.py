@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
-from drivers.lines.priority_lock import Turns
+from drivers.lines.priority_lock import PriorityLock
 from instrument.closeable import Closing
 from instrument.errors import DeviceError
 
@@ -59,7 +59,7 @@ class Line(Closing):
         import serial
 
         self.who, self.port, self.reply_s = who, port, reply_s
-        self.turns = Turns()
+        self.turns = PriorityLock()
         self.dirty = False
         """Whether an answer is still owed: what comes next may belong to an earlier question."""
         self._buffer = bytearray()

@@ -17,7 +17,7 @@ from drivers.v4l2.capture import Traits
 from drivers.v4l2.open_device import CABLE, lost
 from drivers.v4l2.session import EXTRA_FRAMES, Session
 from drivers.v4l2.settings import PixelFormat, V4l2Settings
-from drivers.v4l2.worker_thread import Hung, Life, Reader
+from drivers.v4l2.worker_thread import Heartbeat, Hung, Reader
 from instrument.clock import Clock
 from instrument.closeable import Closing
 from instrument.devices import Frame
@@ -139,7 +139,7 @@ class V4l2Camera(Closing):
                 f"{known.card} did; plug that one in, and name a /dev/v4l/by-id path"
             )
 
-    def _do(self, action: Callable[[Life], Result], quiet_s: float) -> Result:
+    def _do(self, action: Callable[[Heartbeat], Result], quiet_s: float) -> Result:
         """Have the reader do it. After any failure the next call opens the camera anew."""
         try:
             return self._reader.call(action, quiet_s)

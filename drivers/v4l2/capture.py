@@ -25,7 +25,7 @@ from drivers.v4l2.open_device import (
     open_video,
 )
 from drivers.v4l2.settings import STEPS_PER_S, V4l2Settings
-from drivers.v4l2.worker_thread import Life
+from drivers.v4l2.worker_thread import Heartbeat
 from instrument.clock import Clock
 from instrument.devices import Image
 from instrument.errors import CameraLost, DeviceError
@@ -111,7 +111,7 @@ class Capture:
         """Set the exposure in steps of 100 µs and read it back."""
         self._exposure_s = self._controls.set(EXPOSURE, steps) / STEPS_PER_S
 
-    def start(self, life: Life) -> None:
+    def start(self, life: Heartbeat) -> None:
         """Start the stream; the camera's first frame may take its time."""
         began_s = self._clock.now_s()
         started = self._video.grab()
@@ -124,7 +124,7 @@ class Capture:
         if not started:
             self.next(life, self._exposure_s + _STARTING_S)
 
-    def traits(self, life: Life) -> Traits:
+    def traits(self, life: Heartbeat) -> Traits:
         """Start the stream and find out what the camera tells of its frames."""
         began_s = self._clock.now_s()
         self.start(life)
@@ -138,7 +138,7 @@ class Capture:
         measured_s = float(np.min(periods)) if monotonic else 0.0
         return Traits(max(said_s, measured_s), monotonic, told, tuple(self._notes))
 
-    def next(self, life: Life, patience_s: float) -> Arrival:
+    def next(self, life: Heartbeat, patience_s: float) -> Arrival:
         """Take the next frame out of the queue, old or new; a silent camera is an error."""
         deadline_s = self._clock.now_s() + patience_s
         while self._is_filled(life, deadline_s):
@@ -155,7 +155,7 @@ class Capture:
             f"s: the stream stands still; {CABLE}; the next try opens the camera anew"
         )
 
-    def _is_filled(self, life: Life, deadline_s: float) -> bool:
+    def _is_filled(self, life: Heartbeat, deadline_s: float) -> bool:
         """Wait until a frame, or a failure, can be fetched; False once the deadline has passed."""
         left_s = deadline_s - self._clock.now_s()
         if self._stream is None:

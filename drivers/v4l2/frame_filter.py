@@ -8,7 +8,7 @@ that is an exposure and a frame period later than the call has begun after the c
 from __future__ import annotations
 
 
-class Gate:
+class FrameFilter:
     """Told of calls, of changes of the exposure, and of every frame in the order they come.
 
     `period_s` is the frame period at the shortest exposure: no read-out takes longer. Where the

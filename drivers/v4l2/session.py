@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from drivers.v4l2 import ioctl as v4l2
 from drivers.v4l2.capture import PATIENCE_S, Capture, Traits
-from drivers.v4l2.frame_filter import Gate
+from drivers.v4l2.frame_filter import FrameFilter
 from drivers.v4l2.settings import STEPS_PER_S, V4l2Settings
-from drivers.v4l2.worker_thread import Life
+from drivers.v4l2.worker_thread import Heartbeat
 from instrument.clock import Clock
 from instrument.devices import Frame
 
@@ -28,7 +28,7 @@ class Session:
         exposure_steps: int,
         traits: Traits | None,
         clock: Clock,
-        life: Life,
+        life: Heartbeat,
     ) -> None:
         self._settings, self._clock, self._steps = settings, clock, exposure_steps
         self._capture = Capture(settings, exposure_steps, clock)
@@ -46,11 +46,11 @@ class Session:
         self._capture.looks_at_buffers = looks
         self._gate = self._new_gate(traits)
 
-    def _new_gate(self, traits: Traits) -> Gate:
+    def _new_gate(self, traits: Traits) -> FrameFilter:
         settings = self._settings
         uncounted = None if traits.monotonic else settings.buffers + EXTRA_FRAMES
         late = settings.exposure_delay_frames
-        return Gate(self.exposure_s, traits.period_s, late, uncounted)
+        return FrameFilter(self.exposure_s, traits.period_s, late, uncounted)
 
     @property
     def capability(self) -> v4l2.Capability:
@@ -84,7 +84,7 @@ class Session:
             self._gate.exposure_changed(self._clock.now_s(), self.exposure_s)
         return self.exposure_s
 
-    def take(self, life: Life, count: int, called_s: float) -> list[Frame]:
+    def take(self, life: Heartbeat, count: int, called_s: float) -> list[Frame]:
         """Take `count` good frames that began after `called_s`."""
         self._gate.call(called_s)
         frames: list[Frame] = []

@@ -25,7 +25,7 @@ class Hung(Exception):
     """The thread has shown no life for too long; the caller goes on without an answer."""
 
 
-class Life:
+class Heartbeat:
     """What a job and its caller tell each other: still alive, still wanted."""
 
     def __init__(self, clock: Clock) -> None:
@@ -65,12 +65,12 @@ class Reader:
             job()
             del job  # its result is the caller's
 
-    def call(self, action: Callable[[Life], Result], quiet_s: float) -> Result:
+    def call(self, action: Callable[[Heartbeat], Result], quiet_s: float) -> Result:
         """Have `action` done and return its result, or raise what it raised.
 
         `Hung` is raised when the job shows no life for `quiet_s`.
         """
-        life = Life(self._clock)
+        life = Heartbeat(self._clock)
         future = self.post(lambda: action(life))
         try:
             while not wait((future,), _GLANCE_S).done:

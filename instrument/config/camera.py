@@ -13,7 +13,7 @@ V4L2_EXPOSURE_STEP_S = 1e-4
 _FORMAT_BITS = {"GREY": 8, "YUYV": 8, "Y10": 10, "Y16": 16}
 
 
-class Camera(Section):
+class CameraConfig(Section):
     """The camera on the beam: picture, electrons, exposure."""
 
     width_px: Annotated[int, Field(ge=16, le=16384)]
@@ -71,13 +71,13 @@ class Camera(Section):
         return 0.0
 
 
-class SimulatedCamera(Camera):
+class SimulatedCameraConfig(CameraConfig):
     """A camera that is simulated as a whole, in simulated time."""
 
     driver: Literal["simulated"]
 
 
-class V4l2Camera(Camera):
+class V4l2CameraConfig(CameraConfig):
     """A Video4Linux camera; `device` is best a /dev/v4l/by-id path.
 
     `gain` in the camera's own unit; where it is left out the camera must have none or keep its own.
@@ -110,4 +110,4 @@ class V4l2Camera(Camera):
             yield "bit_depth", f"{self.bit_depth}; allowed for {self.pixel_format}: {allowed}"
 
 
-AnyCamera = Annotated[SimulatedCamera | V4l2Camera, Field(discriminator="driver")]
+AnyCamera = Annotated[SimulatedCameraConfig | V4l2CameraConfig, Field(discriminator="driver")]

@@ -64,7 +64,7 @@ Angles = Annotated[
     Annotated[AngleList, Tag("<list>")] | Annotated[Steps, Tag("<steps>")],
     Discriminator(_form_of_angles),
 ]
-Sweep = Annotated[dict[SweepKey, Angles], Field(min_length=3)]
+SweepConfig = Annotated[dict[SweepKey, Angles], Field(min_length=3)]
 
 
 def angles_deg(angles: list[float] | Steps) -> FloatArray:
@@ -74,7 +74,7 @@ def angles_deg(angles: list[float] | Steps) -> FloatArray:
     return np.asarray(angles, dtype=np.float64)
 
 
-class Window(Section):
+class PatchConfig(Section):
     """The patch of the sample that counts, centred on the rotation axis."""
 
     width_mm: Positive
@@ -118,7 +118,7 @@ class References(Section):
     drift_check: DriftCheck | None = None
 
 
-class Fit(Section):
+class FitConfig(Section):
     """What to fit; the default is every model of the ladder.
 
     `method`: how the rough surface is worked out; auto: as cheaply as the data allow.
@@ -155,14 +155,14 @@ class Protocol(Section):
     description: str = ""
     rig: Annotated[str, Field(min_length=1, max_length=1000)]
     sample: Sample
-    sweeps: Annotated[list[Sweep], Field(min_length=1)]
-    window: Window
+    sweeps: Annotated[list[SweepConfig], Field(min_length=1)]
+    window: PatchConfig
     frames_per_point: Annotated[int, Field(ge=1, le=10_000)] = 4
     dark_frames: Annotated[int, Field(ge=1, le=10_000)] = 8
     exposure_target: Annotated[float, Field(gt=0, lt=1)] = 0.7
     keep_frames: bool = False
     references: References = References()
-    fit: Fit = Fit()
+    fit: FitConfig = FitConfig()
     simulated_sample: SimulatedSample | None = None
 
 

@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from instrument.config.axes import AXES, EMULATED, Axes, HandAxis, SimulatedAxis, Wired
-from instrument.config.camera import AnyCamera, SimulatedCamera
+from instrument.config.camera import AnyCamera, SimulatedCameraConfig
 from instrument.config.section import Finite, Name, NotNegative, Positive, Section
 
 _RANGES = ("theta_i_deg", "dphi_deg", "theta_r_deg")
@@ -43,7 +43,7 @@ class KeepOut(Section):
                 yield key, f"[{low:g}, {high:g}]; allowed: [low, high]"
 
 
-class Lamp(Section):
+class LampConfig(Section):
     """The lamp; `shutter` darkens it by itself, `hand` asks the operator to cover it.
 
     A `manual` lamp is a real one that a person serves.
@@ -92,7 +92,7 @@ class Rig(Section):
     axes: Axes
     keep_out: list[KeepOut] = Field(default_factory=list)
     camera: AnyCamera
-    lamp: Lamp
+    lamp: LampConfig
     simulation: Simulation = Simulation()
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
@@ -124,7 +124,7 @@ class Rig(Section):
                 yield f"axis {name}", "simulated"
             elif not isinstance(axis, HandAxis):
                 yield f"axis {name}", "emulated" if axis.port == EMULATED else "real"
-        if isinstance(self.camera, SimulatedCamera):
+        if isinstance(self.camera, SimulatedCameraConfig):
             yield "camera", "simulated"
         else:
             yield "camera", "emulated" if self.camera.device == EMULATED else "real"
@@ -144,7 +144,7 @@ class Rig(Section):
     @property
     def simulated(self) -> bool:
         """Whether the devices are simulated as a whole."""
-        return isinstance(self.camera, SimulatedCamera)
+        return isinstance(self.camera, SimulatedCameraConfig)
 
     @property
     def real(self) -> bool:

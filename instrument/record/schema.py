@@ -10,7 +10,7 @@ from typing import get_args
 
 from instrument.devices import Surface
 from instrument.record.reading import Kind, Reading
-from instrument.record.validation import restrain
+from instrument.record.validation import harden_connection
 
 SCHEMA_VERSION = 3
 
@@ -66,7 +66,7 @@ def connect(path: Path) -> sqlite3.Connection:
     """Open a file as a record: with a write-ahead log, each commit on disk when it returns."""
     database = sqlite3.connect(path)
     try:
-        restrain(database)
+        harden_connection(database)
         database.execute("PRAGMA journal_mode=WAL")
         database.execute("PRAGMA synchronous=FULL")
     except sqlite3.Error:

@@ -61,7 +61,7 @@ def check_files(folder: Path, record: str, *others: str) -> None:
         raise InputError(f"{journal}: {NOT_BEGUN}; else it is no run of this program: {_ADVICE}")
 
 
-def restrain(database: sqlite3.Connection) -> None:
+def harden_connection(database: sqlite3.Connection) -> None:
     """Have SQLite run nothing that stands in the file, and read nothing huge."""
     database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES)
     database.execute("PRAGMA trusted_schema=OFF")

@@ -20,7 +20,7 @@ def first_unfit(text: str) -> str | None:
     return next(filter(_unfit, text), None)
 
 
-def harmless(text: str) -> str:
+def escape_control_characters(text: str) -> str:
     """The text with every such character as its escape, `\\x1b` for one."""
     if first_unfit(text) is None:
         return text

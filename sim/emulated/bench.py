@@ -20,7 +20,7 @@ from pathlib import Path
 
 from instrument.clock import Clock
 from instrument.config.axes import NewportAxis, Wired, ZaberAxis
-from instrument.config.camera import V4l2Camera
+from instrument.config.camera import V4l2CameraConfig
 from instrument.devices import Image, Surface
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.newport_controller import NewportController
@@ -60,7 +60,7 @@ def restart_with_camera() -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class _Seen:
+class _SceneSnapshot:
     """What the scene looked like when an exposure began."""
 
     surface: Surface
@@ -98,14 +98,14 @@ class EmulatedBench:
         self._motors[name] = motor
         return wire.port
 
-    def plug_camera(self, camera: V4l2Camera) -> str:
+    def plug_camera(self, camera: V4l2CameraConfig) -> str:
         """Begin to answer as a camera; returns the device that its driver opens."""
         painted = copy.copy(self._scene)  # its own state; the caches are shared
         sensor, lock = Sensor(painted), threading.Lock()
 
         def render(exposure: Exposure, seen: object) -> Image:
             with lock:
-                if isinstance(seen, _Seen):
+                if isinstance(seen, _SceneSnapshot):
                     painted.surface, painted.lit = seen.surface, seen.lit
                     painted.begin_step(seen.step, seen.planned_s)
                     painted.true_deg = dict(seen.true_deg)
@@ -115,12 +115,12 @@ class EmulatedBench:
         self._closing.enter_context(V4l2Server(device, Path(os.environ[_SOCKET])))
         return CAMERA_DEVICE
 
-    def _snapshot(self) -> _Seen:
+    def _snapshot(self) -> _SceneSnapshot:
         scene = self._scene
         for name, motor in self._motors.items():
             scene.set_axis(name, scene.rig.axes[name].from_device_deg(motor.position_deg))
         state = (scene.surface, scene.lit, scene.step, scene.planned_s)
-        return _Seen(*state, dict(scene.true_deg))
+        return _SceneSnapshot(*state, dict(scene.true_deg))
 
 
 def _controller(axis: Wired, motor: Motor) -> Controller:
@@ -131,7 +131,7 @@ def _controller(axis: Wired, motor: Motor) -> Controller:
     return OrientalController(motor, axis.unit, axis.steps_per_deg)
 
 
-def _described(camera: V4l2Camera) -> Description:
+def _described(camera: V4l2CameraConfig) -> Description:
     return Description(
         formats=(camera.pixel_format,),
         sizes=((camera.width_px, camera.height_px),),

@@ -9,21 +9,17 @@ by the plan's time: the same protocol gives the same bytes, in one go or resumed
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.accuracy.render_brdf import adequate_brdf
 from analysis.models import MODELS
 from instrument.config.protocol import Protocol, SimulatedSample
 from instrument.config.rig import Rig
 from instrument.devices import Surface
-from instrument.geometry import FloatArray, Geometry
-
-Brdf = Callable[[Geometry], FloatArray]
+from instrument.geometry import Brdf, FloatArray, IntArray
 
 
 def key_of(text: str) -> int:
@@ -43,7 +39,7 @@ class Scene:
     step: int = 0
     planned_s: float = 0.0
     true_deg: dict[str, float] = field(default_factory=dict)
-    rings: dict[tuple[str, float, float], NDArray[np.int64]] = field(default_factory=dict)
+    rings: dict[tuple[str, float, float], IntArray] = field(default_factory=dict)
     _texture: FloatArray | None = None
 
     def begin_step(self, step: int, planned_s: float) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from instrument.config.camera import Camera
+from instrument.config.camera import CameraConfig
 from instrument.devices import Image
 from sim.scene.render import FloatImage, electrons_per_s
 from sim.scene.scene import Scene, key_of
@@ -26,7 +26,7 @@ class Sensor:
     def __init__(self, scene: Scene) -> None:
         cv2.setNumThreads(1)  # so small a picture costs more to share out than to work on
         self._scene = scene
-        self._settings: Camera = scene.rig.camera
+        self._settings: CameraConfig = scene.rig.camera
         self._series: tuple[int, ...] = ()
         self._number = 0
         shape = (self._settings.height_px, self._settings.width_px)

@@ -10,7 +10,7 @@ from unittest.mock import patch
 
 from acquisition.commands import scan_session
 from acquisition.engine.engine import Devices
-from acquisition.engine.resume import SoFar
+from acquisition.engine.resume import Progress
 from acquisition.plan.plan import make_plan
 from instrument.config.load import Loaded
 from instrument.devices import Frame
@@ -92,7 +92,7 @@ def scan(
         if disk is not None:
             strike: Action = getattr(record, disk[0])
             moments.plan(*disk[1], strike)
-        before = SoFar(tuple(record.readings()), tuple(record.checks())) if known else None
+        before = Progress(tuple(record.readings()), tuple(record.checks())) if known else None
         try:
             scan_session.scan(loaded, make_plan(loaded), record, before)
         except GonioError as raised:

@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 import pytest
 
 import acquisition.commands.scan_session
-from acquisition.engine.resume import SoFar
+from acquisition.engine.resume import Progress
 from acquisition.plan.plan import Plan, Step, make_plan
 from acquisition.results.reduction import reduce
 from instrument.config.load import Loaded
@@ -183,7 +183,7 @@ def _what_follows_is_linear(done: Soaked) -> None:
     part = whole[: len(whole) // 4]
     ways: dict[str, Callable[[list[object]], object]] = {
         "reduce": lambda readings: reduce(readings, loaded.protocol, checks),
-        "missing": lambda readings: SoFar(tuple(readings)).missing(done.plan),
+        "missing": lambda readings: Progress(tuple(readings)).missing(done.plan),
     }
     for name, way in ways.items():
         a_point = [cpu_seconds(lambda r=r, w=way: w(r), 3) / len(r) for r in (part, whole)]

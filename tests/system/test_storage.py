@@ -16,7 +16,7 @@ import pytest
 
 from acquisition.commands.scan_session import scan
 from acquisition.engine.engine import Devices
-from acquisition.engine.resume import SoFar
+from acquisition.engine.resume import Progress
 from acquisition.plan.plan import make_plan
 from acquisition.rig import open_devices
 from instrument.clock import Clock
@@ -71,7 +71,7 @@ def test_a_run_folder_that_is_moved_ends_the_scan_with_its_new_name(
     assert accepted == 7
     monkeypatch.undo()
     with Record.open(new) as record:
-        scan(LOADED, PLAN, record, SoFar(tuple(record.readings())))
+        scan(LOADED, PLAN, record, Progress(tuple(record.readings())))
         assert undated(record.readings()) == whole
 
 

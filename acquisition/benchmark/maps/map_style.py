@@ -11,10 +11,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.report.style import INK
-from instrument.geometry import FloatArray
+from instrument.geometry import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -107,7 +106,7 @@ def _write(ax: Axes, across: float, up: float, width: float, words: str) -> None
     )  # fmt: skip
 
 
-def _roomiest(region: NDArray[np.bool_]) -> tuple[int, int, float] | None:
+def _roomiest(region: BoolArray) -> tuple[int, int, float] | None:
     """Row, column and width (as a part of the panel) of the roomiest place in a region."""
     from scipy.ndimage import distance_transform_edt
 

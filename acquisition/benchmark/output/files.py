@@ -13,7 +13,7 @@ from typing import Any
 
 from acquisition.benchmark.output.charts import alone, main_chart
 from acquisition.benchmark.output.page import page
-from acquisition.benchmark.result import Bench, Left, MapPicture
+from acquisition.benchmark.result import Bench, BenchFiles, MapPicture
 from acquisition.benchmark.study import Study
 from acquisition.benchmark.trial import Trial, pareto_front
 from instrument.errors import InputError
@@ -35,9 +35,11 @@ def empty_folder(folder: Path) -> None:
         raise InputError(f"{folder}: cannot write the bench there: {error}") from error
 
 
-def write(bench: Bench, folder: Path) -> Left:
+def write(bench: Bench, folder: Path) -> BenchFiles:
     """Write all files of a bench into a folder that is there."""
-    left = Left(folder, folder / "bench.html", folder / "bench.json", folder / "main_chart.svg")
+    left = BenchFiles(
+        folder, folder / "bench.html", folder / "bench.json", folder / "main_chart.svg"
+    )
     write_whole(left.json, to_json(bench))
     for study in bench.studies:
         write_whole(folder / f"{study.name}.csv", table(study))

@@ -84,7 +84,7 @@ def scales_solved(problem: Problem, start: FloatArray) -> FloatArray:
 
 def by_differences(problem: Problem, start: FloatArray) -> FloatArray:
     """The descent with derivatives by central differences."""
-    return replace(problem, model=without_slopes(problem.model)).solve(start).x
+    return replace(problem, model=without_gradient(problem.model)).solve(start).x
 
 
 def trust_region(problem: Problem, start: FloatArray) -> FloatArray:
@@ -168,7 +168,7 @@ def with_scales(problem: Problem, start: FloatArray) -> FloatArray:
     return solved
 
 
-def without_slopes(model: Model) -> Model:
+def without_gradient(model: Model) -> Model:
     """The model without derivatives of its own: central differences in their place."""
     return replace(model, slopes=None)
 

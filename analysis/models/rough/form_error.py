@@ -37,7 +37,6 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import NdBSpline, make_interp_spline
 
-from analysis.models.base import BoolArray
 from analysis.models.rough.oren_nayar import (
     ALBEDO,
     SIGMA_DEG,
@@ -46,7 +45,7 @@ from analysis.models.rough.oren_nayar import (
     oren_nayar_qualitative_brdf,
 )
 from analysis.models.rough.oren_nayar_exact import oren_nayar_exact_brdf
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import BoolArray, FloatArray, Geometry
 
 LIMIT_DEG = 85.0
 """Larger angles from the normal are not in the table: there the integral itself is less certain."""

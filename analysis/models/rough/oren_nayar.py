@@ -14,9 +14,9 @@ import math
 
 import numpy as np
 
-from analysis.models.base import BoolArray, Model, Parameter, Validity, kept
+from analysis.models.base import Model, Parameter, Validity, kept
 from analysis.models.validity import GRAZING, NEGATIVE, both_graze, held
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import BoolArray, FloatArray, Geometry
 
 ALBEDO = Parameter("albedo", "1", 0.0, 1.0, 0.5, scale=True)
 SIGMA_DEG = Parameter("sigma_deg", "degrees", 0.0, 60.0, 20.0)
@@ -37,7 +37,7 @@ def lambert_brdf(geometry: Geometry, albedo: float) -> FloatArray:
     return np.full(geometry.shape, albedo / np.pi)
 
 
-def lambert_slopes(geometry: Geometry, albedo: float) -> dict[str, FloatArray]:
+def lambert_gradient(geometry: Geometry, albedo: float) -> dict[str, FloatArray]:
     """Derivative of `lambert_brdf` by the albedo."""
     del albedo  # the slope is the same at every albedo
     return {"albedo": np.full(geometry.shape, 1 / np.pi)}
@@ -60,13 +60,13 @@ def oren_nayar_qualitative_brdf(
     return (albedo / np.pi) * (A + B * _backward_lobe(geometry))
 
 
-def oren_nayar_qualitative_slopes(
+def oren_nayar_qualitative_gradient(
     geometry: Geometry, albedo: float, sigma_deg: float, constant: float = PRINTED
 ) -> dict[str, FloatArray]:
     """Derivatives of `oren_nayar_qualitative_brdf` by albedo, and by sigma in 1/degree."""
     sigma = math.radians(sigma_deg)
     lobe = _backward_lobe(geometry)
-    dA, dB = -0.5 * _saturation_slope(sigma, constant), 0.45 * _saturation_slope(sigma, 0.09)
+    dA, dB = -0.5 * _saturation_gradient(sigma, constant), 0.45 * _saturation_gradient(sigma, 0.09)
     return {
         "albedo": oren_nayar_qualitative_brdf(geometry, 1.0, sigma_deg, constant),
         "sigma_deg": (albedo / np.pi) * (dA + dB * lobe),
@@ -113,13 +113,15 @@ def _relative_to_lambert(geometry: Geometry, albedo: float, sigma_deg: float) ->
     return np.asarray(direct + twice)
 
 
-def oren_nayar_slopes(geometry: Geometry, albedo: float, sigma_deg: float) -> dict[str, FloatArray]:
+def oren_nayar_gradient(
+    geometry: Geometry, albedo: float, sigma_deg: float
+) -> dict[str, FloatArray]:
     """Derivatives of `oren_nayar_brdf` by albedo, and by sigma in 1/degree."""
     sigma = math.radians(sigma_deg)
     bounce = 0.17 * _second_bounce(geometry)
-    dC1, d_rough = sigma_terms_slopes(sigma_deg)
+    dC1, d_rough = sigma_terms_gradient(sigma_deg)
     d_direct = dC1 + d_rough * roughness_terms(geometry)
-    d_twice = albedo * _saturation_slope(sigma, 0.13) * bounce
+    d_twice = albedo * _saturation_gradient(sigma, 0.13) * bounce
     once_more = albedo * sigma**2 / (sigma**2 + 0.13) * bounce  # (34) has albedo squared
     return {
         "albedo": (_relative_to_lambert(geometry, albedo, sigma_deg) + once_more) / np.pi,
@@ -145,12 +147,12 @@ def _departures(
 ) -> tuple[tuple[BoolArray, str], ...]:
     """Where a form may be off the integral by more than VALID, or nobody knows, and why."""
     # The bounds are made of this module's forms.
-    from analysis.accuracy.rough_surface import closer_bound
+    from analysis.accuracy.rough_surface import tight_bound
 
     if sigma_deg == 0:
         return ()  # a plane: all forms are Lambert's law
     ranges = {"albedo": (albedo, albedo), "sigma_deg": (sigma_deg, sigma_deg)}
-    bound = closer_bound(name, geometry, ranges)
+    bound = tight_bound(name, geometry, ranges)
     return (np.isfinite(bound) & (bound > VALID), _OFF), (np.isinf(bound), _UNKNOWN)
 
 
@@ -171,10 +173,10 @@ def roughness_terms(geometry: Geometry) -> FloatArray:
     return result
 
 
-def sigma_terms_slopes(sigma_deg: float) -> tuple[float, float]:
+def sigma_terms_gradient(sigma_deg: float) -> tuple[float, float]:
     """Derivatives in 1/degree of C1 and of the sigma^2 / (sigma^2 + 0.09) of C2 and C3."""
     sigma = math.radians(sigma_deg)
-    return -0.5 * _saturation_slope(sigma, 0.33), _saturation_slope(sigma, 0.09)
+    return -0.5 * _saturation_gradient(sigma, 0.33), _saturation_gradient(sigma, 0.09)
 
 
 @kept
@@ -191,7 +193,7 @@ def _second_bounce(geometry: Geometry) -> FloatArray:
     return np.asarray(1 - geometry.cos_dphi * np.square(beta * (2 / np.pi)))
 
 
-def _saturation_slope(sigma: float, constant: float) -> float:
+def _saturation_gradient(sigma: float, constant: float) -> float:
     """Derivative of sigma^2 / (sigma^2 + constant), sigma in radians, per degree."""
     return math.radians(2 * sigma * constant / (sigma * sigma + constant) ** 2)
 
@@ -202,14 +204,14 @@ def _larger_and_smaller(geometry: Geometry) -> tuple[FloatArray, FloatArray]:
     return np.maximum(theta_i, theta_r), np.minimum(theta_i, theta_r)
 
 
-LAMBERT = Model("lambert", (ALBEDO,), lambert_brdf, lambert_slopes)
+LAMBERT = Model("lambert", (ALBEDO,), lambert_brdf, lambert_gradient)
 OREN_NAYAR_QUALITATIVE = Model(
     "oren_nayar_qualitative",
     (ALBEDO, SIGMA_DEG),
     oren_nayar_qualitative_brdf,
-    oren_nayar_qualitative_slopes,
+    oren_nayar_qualitative_gradient,
     oren_nayar_qualitative_holds,
 )
 OREN_NAYAR = Model(
-    "oren_nayar", (ALBEDO, SIGMA_DEG), oren_nayar_brdf, oren_nayar_slopes, oren_nayar_holds
+    "oren_nayar", (ALBEDO, SIGMA_DEG), oren_nayar_brdf, oren_nayar_gradient, oren_nayar_holds
 )

@@ -88,7 +88,7 @@ def oren_nayar_exact_brdf(
     return (albedo / np.pi) * (direct + albedo * twice)
 
 
-def oren_nayar_exact_slopes(
+def oren_nayar_exact_gradient(
     geometry: Geometry, albedo: float, sigma_deg: float
 ) -> dict[str, FloatArray]:
     """Derivatives of the BRDF: by `albedo` in 1/sr, by `sigma_deg` in 1/sr per degree.
@@ -318,7 +318,7 @@ OREN_NAYAR_EXACT = Model(
     "oren_nayar_exact",
     (ALBEDO, SIGMA_DEG),
     oren_nayar_exact_brdf,
-    oren_nayar_exact_slopes,
+    oren_nayar_exact_gradient,
     oren_nayar_exact_holds,
     in_blocks=False,
 )

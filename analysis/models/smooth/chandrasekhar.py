@@ -43,7 +43,7 @@ def h_exact(mu: ArrayLike, albedo: float) -> FloatArray:
     return np.exp(_transform(mu, _logarithms(_in_unit("albedo", albedo))))
 
 
-def log_h_slope(mu: ArrayLike, albedo: float) -> FloatArray:
+def log_h_gradient(mu: ArrayLike, albedo: float) -> FloatArray:
     """Derivative of ln H(mu) by the albedo rho < 1, under the integral of `h_exact`.
 
     (mu/pi) int_0^{pi/2} t cot t / (1 - rho t cot t) / (cos^2 t + mu^2 sin^2 t) dt; it grows as
@@ -56,7 +56,7 @@ def log_h_slope(mu: ArrayLike, albedo: float) -> FloatArray:
     return _transform(mu, -np.pi / 2 * W * t_cot_t / rest)
 
 
-def log_h_slope_by_mu(mu: ArrayLike, albedo: float) -> FloatArray:
+def log_h_gradient_by_mu(mu: ArrayLike, albedo: float) -> FloatArray:
     """Derivative of ln H(mu) by mu above 0, under the integral of `h_exact`.
 
     -(1/pi) int_0^{pi/2} ln(1 - rho t cot t) (cos^2 t - mu^2 sin^2 t)/(cos^2 t + mu^2 sin^2 t)^2 dt.

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.models.validity import polar
-from instrument.geometry import FloatArray
+from instrument.geometry import BoolArray, FloatArray
 
 ComplexArray = NDArray[np.complex128]
 
@@ -90,7 +90,7 @@ def transmittance(theta: ArrayLike, n: ArrayLike) -> FloatArray:
     return result
 
 
-def transmittance_slope(theta: ArrayLike, n: ArrayLike) -> FloatArray:
+def transmittance_gradient(theta: ArrayLike, n: ArrayLike) -> FloatArray:
     """Derivative of `transmittance` by n. It grows without limit at grazing where n = 1.
 
     By dq/dn = n/q: d(F_perp)/dn = -2 n c / (q (c + q)^2) and
@@ -102,7 +102,7 @@ def transmittance_slope(theta: ArrayLike, n: ArrayLike) -> FloatArray:
     return _chained(c, n, q, d_perp, d_para)
 
 
-def transmittance_slope_by_cosine(theta: ArrayLike, n: ArrayLike) -> FloatArray:
+def transmittance_gradient_by_cosine(theta: ArrayLike, n: ArrayLike) -> FloatArray:
     """Derivative of `transmittance` by cos(theta).
 
     By dq/dc = c/q: d(F_perp)/dc = 2 (n^2 - 1) / (q (c + q)^2) and
@@ -159,5 +159,5 @@ def _checked(index: ArrayLike) -> NDArray[np.complex128]:
     return Y
 
 
-def _first(values: FloatArray, fine: NDArray[np.bool_]) -> float:
+def _first(values: FloatArray, fine: BoolArray) -> float:
     return float(values[~fine].flat[0])

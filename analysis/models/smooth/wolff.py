@@ -20,13 +20,18 @@ from analysis.models.rough.oren_nayar import (
     ALBEDO,
     SIGMA_DEG,
     roughness_terms,
-    sigma_terms_slopes,
+    sigma_terms_gradient,
 )
-from analysis.models.smooth.chandrasekhar import h_exact, h_order, log_h_slope, log_h_slope_by_mu
+from analysis.models.smooth.chandrasekhar import (
+    h_exact,
+    h_order,
+    log_h_gradient,
+    log_h_gradient_by_mu,
+)
 from analysis.models.smooth.fresnel import (
     transmittance,
-    transmittance_slope,
-    transmittance_slope_by_cosine,
+    transmittance_gradient,
+    transmittance_gradient_by_cosine,
     wolff_polynomial,
 )
 from analysis.models.tanh_rule import W, X
@@ -94,7 +99,7 @@ def wolff_brdf(
     return np.asarray(varrho_1 / (1 - K[1]) * _both_transmittances(geometry, n, epsilon))
 
 
-def wolff_slopes(
+def wolff_gradient(
     geometry: Geometry, single_scattering_albedo: float, n: float
 ) -> dict[str, FloatArray]:
     """Derivatives of `wolff_brdf` by rho and by n, under the integrals.
@@ -104,12 +109,12 @@ def wolff_slopes(
     rho = single_scattering_albedo
     mu = _both_refracted(geometry, n)
     H, K = _h_and_k(mu, rho, n)
-    dlog_H, dK = _h_and_k_slopes(mu, min(rho, 1 - 1e-12), n)
+    dlog_H, dK = _h_and_k_gradient(mu, min(rho, 1 - 1e-12), n)
     per_rho = H[0] * H[1] / (4 * np.pi * n * n * (mu[0] + mu[1]) * (1 - K[1]))
     growth = 1 + rho * (dlog_H[0] + dlog_H[1] + dK[1] / (1 - K[1]))
     transmitted = _both_transmittances(geometry, n)
     growth_by_n = _growth_by_n(mu, K[1], rho, n)
-    by_n = rho * per_rho * (growth_by_n * transmitted + _both_transmittances_slope(geometry, n))
+    by_n = rho * per_rho * (growth_by_n * transmitted + _both_transmittances_gradient(geometry, n))
     return {
         "single_scattering_albedo": np.asarray(per_rho * transmitted * growth),
         "n": np.asarray(by_n),
@@ -159,12 +164,12 @@ def _h(mu: FloatArray, rho: float, order: int | None) -> FloatArray:
     return h_exact(mu, rho) if order is None else h_order(mu, rho, order)
 
 
-def _internal_return_slope(mu_ref: FloatArray, rho: float, n: float) -> FloatArray:
+def _internal_return_gradient(mu_ref: FloatArray, rho: float, n: float) -> FloatArray:
     """Derivative of `internal_return` by rho, under the integral."""
     x, weight = _inside(rho, n)
-    H, dlog_H = h_exact(mu_ref, rho), log_h_slope(mu_ref, rho)
+    H, dlog_H = h_exact(mu_ref, rho), log_h_gradient(mu_ref, rho)
     inverse = 1 / (x + mu_ref[:, np.newaxis])
-    by_x = rho * (inverse @ (weight * log_h_slope(x, rho)))
+    by_x = rho * (inverse @ (weight * log_h_gradient(x, rho)))
     return np.asarray(H / 2 * ((1 + rho * dlog_H) * (inverse @ weight) + by_x))
 
 
@@ -180,13 +185,15 @@ def _h_and_k(
     return np.asarray(np.exp(log_H), dtype=np.float64), K
 
 
-def _h_and_k_slopes(mu: FloatArray, rho: float, n: float) -> tuple[FloatArray, FloatArray]:
+def _h_and_k_gradient(mu: FloatArray, rho: float, n: float) -> tuple[FloatArray, FloatArray]:
     """Derivatives of ln H(mu) and K(mu) by rho < 1."""
     few = _few_cosines(mu)
     if few is not None:
         cosines, place = few
-        return log_h_slope(cosines, rho)[place], _internal_return_slope(cosines, rho, n)[place]
-    dlog_H, dK = _evaluate(_h_and_k_slope_series(rho, n), mu, n)
+        return log_h_gradient(cosines, rho)[place], _internal_return_gradient(cosines, rho, n)[
+            place
+        ]
+    dlog_H, dK = _evaluate(_h_and_k_gradient_series(rho, n), mu, n)
     return dlog_H, dK
 
 
@@ -207,8 +214,8 @@ def _internal_return_by_n(mu_ref: FloatArray, rho: float, n: float) -> FloatArra
     c, weight = _FEW if n >= _BEND_INSIDE else (X, W)
     sin2 = (1 - c) * (1 + c)
     outside = np.arccos(c)
-    dF = c * transmittance_slope(outside, n)
-    dF = sin2 / n * transmittance_slope_by_cosine(outside, n) - dF
+    dF = c * transmittance_gradient(outside, n)
+    dF = sin2 / n * transmittance_gradient_by_cosine(outside, n) - dF
     x = _refracted(outside, n)
     weight = weight * dF * h_exact(x, rho) / (n * n)
     return np.asarray(rho / 2 * h_exact(mu_ref, rho) * ((1 / (x + mu_ref[:, np.newaxis])) @ weight))
@@ -222,9 +229,9 @@ def _h_and_k_series(rho: float, n: float, order: int | None = None) -> FloatArra
 
 
 @lru_cache(maxsize=64)
-def _h_and_k_slope_series(rho: float, n: float) -> FloatArray:
+def _h_and_k_gradient_series(rho: float, n: float) -> FloatArray:
     mu, to_series = _chebyshev(n)
-    slopes = [log_h_slope(mu, rho), _internal_return_slope(mu, rho, n)]
+    slopes = [log_h_gradient(mu, rho), _internal_return_gradient(mu, rho, n)]
     return np.asarray(to_series @ np.stack(slopes, axis=1))
 
 
@@ -241,7 +248,7 @@ def _h_and_k_by_n(mu: FloatArray, rho: float, n: float) -> tuple[FloatArray, Flo
 
 def _of_few_by_n(mu: FloatArray, rho: float, n: float) -> tuple[FloatArray, FloatArray]:
     """`_h_and_k_by_n` of a vector of few cosines, straight."""
-    H, dlog_H = h_exact(mu, rho), log_h_slope_by_mu(mu, rho)
+    H, dlog_H = h_exact(mu, rho), log_h_gradient_by_mu(mu, rho)
     x, weight = _inside(rho, n)
     inverse = 1 / (x + mu[:, np.newaxis])
     K_by_mu = rho / 2 * H * (dlog_H * (inverse @ weight) - np.square(inverse) @ weight)
@@ -325,10 +332,10 @@ def _both_transmittances(geometry: Geometry, n: float, epsilon: float | None = N
     return (1 - F_i) * (1 - F_r)
 
 
-def _both_transmittances_slope(geometry: Geometry, n: float) -> FloatArray:
+def _both_transmittances_gradient(geometry: Geometry, n: float) -> FloatArray:
     """Derivative of the two, exact, by n."""
     T_i, T_r = transmittance(geometry.theta_i, n), transmittance(geometry.theta_r, n)
-    dT_i, dT_r = (transmittance_slope(t, n) for t in (geometry.theta_i, geometry.theta_r))
+    dT_i, dT_r = (transmittance_gradient(t, n) for t in (geometry.theta_i, geometry.theta_r))
     return T_r * dT_i + T_i * dT_r
 
 
@@ -348,13 +355,13 @@ def wolff_oren_nayar_brdf(
     return np.asarray((albedo / np.pi) * (C1 + rough))
 
 
-def wolff_oren_nayar_slopes(
+def wolff_oren_nayar_gradient(
     geometry: Geometry, albedo: float, sigma_deg: float, n: float
 ) -> dict[str, FloatArray]:
     """Derivatives of `wolff_oren_nayar_brdf` by albedo, by sigma in 1/degree, and by n."""
     sigma2 = math.radians(sigma_deg) ** 2
-    T, dT = _both_transmittances(geometry, n), _both_transmittances_slope(geometry, n)
-    dC1, d_rough = sigma_terms_slopes(sigma_deg)
+    T, dT = _both_transmittances(geometry, n), _both_transmittances_gradient(geometry, n)
+    dC1, d_rough = sigma_terms_gradient(sigma_deg)
     return {
         "albedo": wolff_oren_nayar_brdf(geometry, 1.0, sigma_deg, n),
         "sigma_deg": (albedo / np.pi) * (dC1 * T + d_rough * roughness_terms(geometry)),
@@ -385,11 +392,11 @@ def roughness_share(sigma_deg: float) -> float:
     return 0.45 * sigma2 / (sigma2 + 0.09) / (1 - 0.5 * sigma2 / (sigma2 + 0.33))
 
 
-WOLFF = Model("wolff", (SINGLE_SCATTERING_ALBEDO, N), wolff_brdf, wolff_slopes, wolff_holds)
+WOLFF = Model("wolff", (SINGLE_SCATTERING_ALBEDO, N), wolff_brdf, wolff_gradient, wolff_holds)
 WOLFF_OREN_NAYAR = Model(
     "wolff_oren_nayar",
     (ALBEDO, SIGMA_DEG, N),
     wolff_oren_nayar_brdf,
-    wolff_oren_nayar_slopes,
+    wolff_oren_nayar_gradient,
     wolff_oren_nayar_holds,
 )

@@ -60,7 +60,7 @@ def lobe_brdf(
     return scale * _before_the_sum(geometry, correlation_length) * poisson_sum(g, q, _per_m)
 
 
-def lobe_slopes(
+def lobe_gradient(
     geometry: Geometry, scale: float, sigma_h: float, correlation_length: float
 ) -> dict[str, FloatArray]:
     """Derivatives of `lobe_brdf` by its parameters, in 1/sr per unit of each: sums over m again."""
@@ -286,6 +286,6 @@ BECKMANN_SPIZZICHINO = Model(
     "beckmann_spizzichino",
     (SCALE, SIGMA_H, CORRELATION_LENGTH),
     lobe_brdf,
-    lobe_slopes,
+    lobe_gradient,
     lobe_validity,
 )

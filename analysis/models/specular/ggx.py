@@ -45,7 +45,7 @@ def ggx_brdf(geometry: Geometry, f0: float, alpha: float) -> FloatArray:
     return np.asarray(F * D * visibility)
 
 
-def ggx_slopes(geometry: Geometry, f0: float, alpha: float) -> dict[str, FloatArray]:
+def ggx_gradient(geometry: Geometry, f0: float, alpha: float) -> dict[str, FloatArray]:
     """Derivatives of `ggx_brdf` by f0 and by alpha."""
     cos2_a, cos_half, D, visibility = _factors(geometry, alpha)
     schlick = np.power(1 - cos_half, 5)
@@ -73,11 +73,11 @@ def ggx_f90_brdf(geometry: Geometry, f0: float, f90: float, alpha: float) -> Flo
     return np.asarray(F * D * visibility)
 
 
-def ggx_f90_slopes(
+def ggx_f90_gradient(
     geometry: Geometry, f0: float, f90: float, alpha: float
 ) -> dict[str, FloatArray]:
     """Derivatives of `ggx_f90_brdf` by f0, f90 and alpha."""
-    mirrors = ggx_slopes(geometry, 1.0, alpha)["alpha"]  # of facets that reflect all light
+    mirrors = ggx_gradient(geometry, 1.0, alpha)["alpha"]  # of facets that reflect all light
     _, cos_half, D, visibility = _factors(geometry, alpha)
     schlick = np.power(1 - cos_half, 5)
     return {
@@ -128,5 +128,5 @@ def _q(theta: FloatArray, alpha: float) -> FloatArray:
     return np.asarray(np.sqrt(np.square(np.cos(theta)) + np.square(alpha * np.sin(theta))))
 
 
-GGX = Model("ggx", (F0, ALPHA), ggx_brdf, ggx_slopes, ggx_holds)
-GGX_F90 = Model("ggx_f90", (F0, F90, ALPHA), ggx_f90_brdf, ggx_f90_slopes, ggx_f90_holds)
+GGX = Model("ggx", (F0, ALPHA), ggx_brdf, ggx_gradient, ggx_holds)
+GGX_F90 = Model("ggx_f90", (F0, F90, ALPHA), ggx_f90_brdf, ggx_f90_gradient, ggx_f90_holds)

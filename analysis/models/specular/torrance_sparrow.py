@@ -49,7 +49,7 @@ def torrance_sparrow_brdf(geometry: Geometry, ks: float, sigma_deg: float) -> Fl
     return ks * P / _denominator(geometry)
 
 
-def torrance_sparrow_slopes(
+def torrance_sparrow_gradient(
     geometry: Geometry, ks: float, sigma_deg: float
 ) -> dict[str, FloatArray]:
     """Derivatives of the BRDF by `ks` and by `sigma_deg`, in 1/sr and 1/sr per degree.
@@ -69,11 +69,11 @@ def torrance_sparrow_lobe_brdf(geometry: Geometry, ks: float, lobe_sigma_deg: fl
     return torrance_sparrow_brdf(geometry, ks, lobe_sigma_deg)
 
 
-def torrance_sparrow_lobe_slopes(
+def torrance_sparrow_lobe_gradient(
     geometry: Geometry, ks: float, lobe_sigma_deg: float
 ) -> dict[str, FloatArray]:
     """Derivatives of `torrance_sparrow_lobe_brdf`, by name."""
-    slopes = torrance_sparrow_slopes(geometry, ks, lobe_sigma_deg)
+    slopes = torrance_sparrow_gradient(geometry, ks, lobe_sigma_deg)
     return {"ks": slopes["ks"], "lobe_sigma_deg": slopes["sigma_deg"]}
 
 
@@ -196,13 +196,13 @@ TORRANCE_SPARROW = Model(
     "torrance_sparrow",
     (KS, SIGMA_DEG),
     torrance_sparrow_brdf,
-    torrance_sparrow_slopes,
+    torrance_sparrow_gradient,
     torrance_sparrow_validity,
 )
 TORRANCE_SPARROW_LOBE = Model(
     "torrance_sparrow_lobe",
     (KS, LOBE_SIGMA_DEG),
     torrance_sparrow_lobe_brdf,
-    torrance_sparrow_lobe_slopes,
+    torrance_sparrow_lobe_gradient,
     torrance_sparrow_validity,
 )

@@ -45,7 +45,7 @@ def unified_brdf(
         return np.asarray(diffuse / math.pi + lobe_part + spike_part)
 
 
-def unified_slopes(
+def unified_gradient(
     geometry: Geometry,
     diffuse: float,
     lobe: float,
@@ -143,6 +143,6 @@ UNIFIED = Model(
     "unified",
     (DIFFUSE, LOBE, SIGMA_DEG, SPIKE, SPIKE_WIDTH_DEG),
     unified_brdf,
-    unified_slopes,
+    unified_gradient,
     unified_validity,
 )

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from acquisition.engine.engine import Devices, Engine
-from acquisition.engine.resume import SoFar
+from acquisition.engine.resume import Progress
 from acquisition.measure.drift import Drift
 from acquisition.plan.plan import Step, make_plan
 from acquisition.results.reduction import reduce
@@ -38,8 +38,8 @@ def whole(small: Loaded, tmp_path_factory: pytest.TempPathFactory) -> list[Readi
         return undated(record.readings())
 
 
-def so_far(record: Record) -> SoFar:
-    return SoFar(tuple(record.readings()), tuple(record.checks()))
+def so_far(record: Record) -> Progress:
+    return Progress(tuple(record.readings()), tuple(record.checks()))
 
 
 class Cut(Exception):

@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 
 from analysis.choice.symmetry_test import UNLIKELY, Symmetry, symmetry
-from analysis.data.covariance import Brdf
 from analysis.data.measurements import Measurements
 from analysis.models import MODELS
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import Brdf, FloatArray, Geometry
 from tests.support.seeded_scan import scan
 
 PLASTIC = {"single_scattering_albedo": 0.9, "n": 1.5}

@@ -12,8 +12,8 @@ import pytest
 from analysis.models import MODELS, Model
 from analysis.models.rough.oren_nayar import (
     oren_nayar_qualitative_brdf,
+    oren_nayar_qualitative_gradient,
     oren_nayar_qualitative_holds,
-    oren_nayar_qualitative_slopes,
 )
 from instrument.geometry import Geometry
 
@@ -162,7 +162,7 @@ def test_footnote_11_s_constant() -> None:
     np.testing.assert_allclose(brighter - usual, expected, rtol=1e-12)
     step = 1e-5
     up, down = (oren_nayar_qualitative_brdf(geometry, 0.9, 30 + d, 0.57) for d in (step, -step))
-    slopes = oren_nayar_qualitative_slopes(geometry, 0.9, 30.0, constant=0.57)
+    slopes = oren_nayar_qualitative_gradient(geometry, 0.9, 30.0, constant=0.57)
     np.testing.assert_allclose(slopes["sigma_deg"], (up - down) / (2 * step), rtol=1e-6, atol=1e-10)
     assert oren_nayar_qualitative_holds(geometry, 0.9, 5.0, constant=0.57).mask.any()
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.lines.priority_lock import Turns
+from drivers.lines.priority_lock import PriorityLock
 from drivers.lines.serial_line import Garbled, Line, PortGone
 from drivers.stages import newport_framing, zaber_framing
 from drivers.stages.motor_stage import MotorStage, Status, Stopped
@@ -335,7 +335,7 @@ def test_one_changed_byte_makes_no_reply(
 
 
 def test_an_urgent_turn_goes_before_those_that_wait() -> None:
-    turns, order, waiting = Turns(), [], threading.Barrier(3)
+    turns, order, waiting = PriorityLock(), [], threading.Barrier(3)
 
     def take(name: str, urgent: bool) -> None:
         waiting.wait()

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.v4l2.frame_filter import Gate
+from drivers.v4l2.frame_filter import FrameFilter
 
 exposures = st.floats(1e-4, 5.0)
 
@@ -46,7 +46,7 @@ def test_what_counts_began_after_the_call_at_the_new_exposure(
     delay_frames: int,
     stamp_at_end: bool,
 ) -> None:
-    gate = Gate(old_s, overhead_s, delay_frames, None)
+    gate = FrameFilter(old_s, overhead_s, delay_frames, None)
     frames = sensor([(-9.0, old_s), (changed_s, new_s)], overhead_s, -3.0, delay_frames)
     called_s = changed_s + waited_s
     gate.exposure_changed(changed_s, new_s)
@@ -63,7 +63,7 @@ def test_what_counts_began_after_the_call_at_the_new_exposure(
 
 def test_frames_are_not_thrown_away_without_need() -> None:
     """A steady camera, stamps at the end: at most two frames beyond the first that began later."""
-    gate = Gate(0.01, 0.03, 2, None)
+    gate = FrameFilter(0.01, 0.03, 2, None)
     gate.call(0.0)
     stamps = [gate.admits(0.03 * n + 0.005) for n in range(10)]
     assert stamps.index(True) <= 4 + 0
@@ -72,7 +72,7 @@ def test_frames_are_not_thrown_away_without_need() -> None:
 
 
 def test_an_unchanged_exposure_costs_no_frames() -> None:
-    gate = Gate(0.01, 0.005, 0, None)
+    gate = FrameFilter(0.01, 0.005, 0, None)
     gate.call(1.0)
     assert not gate.admits(1.014)
     assert gate.admits(1.016)
@@ -80,7 +80,7 @@ def test_an_unchanged_exposure_costs_no_frames() -> None:
 
 @pytest.mark.parametrize("late", [0, 2])
 def test_without_a_clock_frames_are_counted(late: int) -> None:
-    gate = Gate(0.01, 0.005, late, 6)
+    gate = FrameFilter(0.01, 0.005, late, 6)
     gate.call(0.0)
     assert [gate.admits(0.0) for _ in range(10)].index(True) == 6 + late
     gate.call(0.0)

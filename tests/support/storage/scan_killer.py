@@ -22,7 +22,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from acquisition.engine.engine import Engine
-from acquisition.engine.resume import SoFar
+from acquisition.engine.resume import Progress
 from acquisition.plan.plan import Plan, Step, make_plan
 from acquisition.results.reduction import reduce
 from acquisition.rig import open_devices
@@ -54,7 +54,7 @@ def scan(folder: Path, loaded: Loaded, plan: Plan, told: Callable[[int], None]) 
         told(step.index)
 
     with opened(folder) as record, record.claimed():
-        before = SoFar(tuple(record.readings()), tuple(record.checks()))
+        before = Progress(tuple(record.readings()), tuple(record.checks()))
         if not before.missing(plan):
             return
         engine = Engine(loaded.protocol, loaded.rig, open_devices(loaded), record, on_step)

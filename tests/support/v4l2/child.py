@@ -56,7 +56,7 @@ class Child:
     def ungated_grab(self, count: int) -> list[Frame]:
         """What a program gets that takes every frame as it comes."""
         assert self.camera is not None
-        with patch("drivers.v4l2.frame_filter.Gate.admits", return_value=True):
+        with patch("drivers.v4l2.frame_filter.FrameFilter.admits", return_value=True):
             return self.camera.grab(count)
 
     def said(self) -> list[str]:

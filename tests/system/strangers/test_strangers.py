@@ -20,7 +20,7 @@ from instrument.config.load import Loaded, load_protocol, load_rig
 from instrument.config.yaml_positions import MAX_BYTES
 from instrument.errors import DeviceError, InputError
 from instrument.text.atomic_file import write_whole
-from instrument.text.terminal_safe import first_unfit, harmless
+from instrument.text.terminal_safe import escape_control_characters, first_unfit
 from tests.instrument.config.test_load import PROTOCOL, RIG
 from tests.support.csv_texts import BARE
 from tests.support.paths import CONFIGS
@@ -217,8 +217,8 @@ def test_names_are_shown_as_they_stand_on_the_terminal() -> None:
 
 def test_what_is_harmless_is_left_alone() -> None:
     plain = "Schaumstoff – 石膏 – ρ = 0,8\u00a0% (à 20\u2009°C)\n\tθᵢ ±2°"
-    assert harmless(plain) == plain
-    assert harmless("a\x1bb\ud800") == "a\\x1bb\\ud800"
+    assert escape_control_characters(plain) == plain
+    assert escape_control_characters("a\x1bb\ud800") == "a\\x1bb\\ud800"
 
 
 def test_names_are_escaped_in_the_report() -> None:

@@ -18,7 +18,7 @@ from analysis.fit.fit import fit
 from analysis.models import MODELS
 from analysis.models.rough.oren_nayar import VALID
 from instrument.config.load import load_protocol
-from instrument.config.protocol import Fit, SimulatedSample
+from instrument.config.protocol import FitConfig, SimulatedSample
 from instrument.geometry import Geometry
 from instrument.pinhole import Pinhole
 from tests.support.paths import CONFIGS
@@ -109,10 +109,10 @@ def test_a_method_that_is_asked_for_is_the_only_one(method: str, own: str) -> No
 
 
 def test_a_protocol_names_the_method_or_the_models() -> None:
-    assert Fit().method == SimulatedSample(model="lambert", parameters={}).method == "auto"
-    assert Fit(method="exact").models is None
+    assert FitConfig().method == SimulatedSample(model="lambert", parameters={}).method == "auto"
+    assert FitConfig(method="exact").models is None
     with pytest.raises(ValidationError, match="method: exact; allowed: auto, as `models` names"):
-        Fit(method="exact", models=["lambert"])
+        FitConfig(method="exact", models=["lambert"])
 
 
 # What a sweep can tell.

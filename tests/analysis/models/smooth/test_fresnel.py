@@ -13,8 +13,8 @@ from analysis.models.smooth.fresnel import (
     polarised,
     reflectances,
     transmittance,
-    transmittance_slope,
-    transmittance_slope_by_cosine,
+    transmittance_gradient,
+    transmittance_gradient_by_cosine,
     unpolarised,
     wolff_polynomial,
 )
@@ -152,7 +152,7 @@ def test_the_slope_by_n(n: float) -> None:
 
         with mp.workdps(40):
             expected = float(mp.diff(transmitted, mp.mpf(n)))
-        assert transmittance_slope(t, n) == pytest.approx(expected, rel=1e-10, abs=1e-13)
+        assert transmittance_gradient(t, n) == pytest.approx(expected, rel=1e-10, abs=1e-13)
 
 
 @pytest.mark.parametrize("n", [1.0, 1.001, 1.5, 3.0])
@@ -166,7 +166,7 @@ def test_the_slope_by_the_cosine(n: float) -> None:
 
         with mp.workdps(40):
             expected = float(mp.diff(transmitted, mp.cos(mp.mpf(float(t)))))
-        found = transmittance_slope_by_cosine(t, n)
+        found = transmittance_gradient_by_cosine(t, n)
         assert found == pytest.approx(expected, rel=1e-10, abs=1e-13)
 
 

@@ -12,7 +12,12 @@ import pytest
 from scipy.integrate import IntegrationWarning, quad
 
 from analysis.models import MODELS
-from analysis.models.smooth.chandrasekhar import characteristic_roots, h_exact, h_order, log_h_slope
+from analysis.models.smooth.chandrasekhar import (
+    characteristic_roots,
+    h_exact,
+    h_order,
+    log_h_gradient,
+)
 from analysis.models.smooth.fresnel import unpolarised, wolff_polynomial
 from analysis.models.smooth.wolff import (
     TRANSITION_DEG,
@@ -114,7 +119,7 @@ def test_the_slope_of_h() -> None:
     for rho in (0.1, 0.9, 0.999):
         step = 1e-5 * (1 - rho)
         up, down = np.log(h_exact(mu, rho + step)), np.log(h_exact(mu, rho - step))
-        np.testing.assert_allclose(log_h_slope(mu, rho), (up - down) / (2 * step), rtol=1e-6)
+        np.testing.assert_allclose(log_h_gradient(mu, rho), (up - down) / (2 * step), rtol=1e-6)
 
 
 @cache

@@ -87,7 +87,7 @@ def test_the_sum_to_eleven_digits(g: float) -> None:
 
 
 @pytest.mark.parametrize("g", [1e-3, 2.0, 25.0, 45.0, 300.0, 2e4])
-def test_the_sums_of_the_slopes(g: float) -> None:
+def test_the_sums_of_the_gradient(g: float) -> None:
     for q in (0.0, 0.3 * g, 20 * g, 900.0):
         with mp.workdps(25):
             sums = [float(s) for s in exact_sums(mp.mpf(g), mp.mpf(q), list(WEIGHTS))]
