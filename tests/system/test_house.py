@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tomllib
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -41,3 +43,23 @@ def test_a_waiting_test_carries_its_mark_in_its_own_file() -> None:
     assert helpers
     assert not [p.name for p in helpers if mark in p.read_text()]
     assert mark.replace(".", r"\.") in (ROOT / "Makefile").read_text()
+
+
+def test_the_shipped_configuration_is_part_of_the_package() -> None:
+    """What pyproject.toml packs: every YAML file, found as an installed program finds it."""
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        setup = tomllib.load(file)["tool"]["setuptools"]
+    assert "configs" in setup["packages"]
+    shipped = files("configs")
+    folder = ROOT / "configs"
+    packed = {p for form in setup["package-data"]["configs"] for p in folder.glob(form)}
+    assert packed == set(folder.rglob("*.yaml"))
+    assert all(shipped.joinpath(*p.relative_to(folder).parts).is_file() for p in packed)
+
+
+def test_every_folder_with_modules_is_a_listed_package() -> None:
+    """A folder that pyproject.toml does not list would be missing from an installed program."""
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        listed = set(tomllib.load(file)["tool"]["setuptools"]["packages"])
+    rooms = {p.parent for top in (*PACKAGES, "configs") for p in (ROOT / top).rglob("*.py")}
+    assert {".".join(room.relative_to(ROOT).parts) for room in rooms} == listed
