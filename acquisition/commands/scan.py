@@ -14,13 +14,13 @@ from pathlib import Path
 
 from acquisition.afterwards import Afterwards
 from acquisition.commands.scan_session import scan
+from acquisition.commands.views import print_outcome, print_plan
 from acquisition.engine.frame_files import require_room
 from acquisition.engine.resume import Progress
 from acquisition.plan.moves import home_pose, moves_between
 from acquisition.plan.plan import Plan, make_plan
 from acquisition.results.model_check import check_model
 from acquisition.rig import prepare
-from acquisition.terminal.console import print_outcome, print_plan
 from acquisition.terminal.operator import require_yes
 from instrument.config.load import Loaded, load_protocol
 from instrument.errors import InputError, StorageError

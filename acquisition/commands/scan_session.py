@@ -10,7 +10,7 @@ from acquisition.engine.event_log import EventLogHandler, noted
 from acquisition.engine.resume import Progress
 from acquisition.plan.plan import Plan, Step
 from acquisition.rig import open_devices
-from acquisition.terminal.console import console, duration_text, progress
+from acquisition.terminal.console import console, duration_text, progress_bar
 from instrument.clock import Clock, SystemClock
 from instrument.config.load import Loaded
 from instrument.errors import DeviceError, OperatorStop, StorageError
@@ -57,7 +57,7 @@ def _drive(
         highlight=False,
         soft_wrap=True,
     )
-    with progress(plan, before.done) as show:
+    with progress_bar(plan, before.done) as show:
         told = _both(show, notes)
         Engine(loaded.protocol, loaded.rig, devices, record, told).run(plan, so_far)
     notes.write()

@@ -11,7 +11,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from acquisition.commands.scan import _default_folder
-from acquisition.terminal.console import _Harmless
+from acquisition.terminal.console import EscapingConsole
 from analysis.data.csv_table import read_csv
 from analysis.report.data import ReportData
 from analysis.report.page import report_html
@@ -205,7 +205,7 @@ def test_a_name_leads_to_no_other_folder(tmp_path: Path) -> None:
 
 def test_names_are_shown_as_they_stand_on_the_terminal() -> None:
     shown = io.StringIO()
-    _Harmless(file=shown, markup=False, emoji=False, force_terminal=True, width=200).print(
+    EscapingConsole(file=shown, markup=False, emoji=False, force_terminal=True, width=200).print(
         HARMFUL, highlight=False
     )
     text = shown.getvalue()

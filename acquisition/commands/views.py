@@ -1,0 +1,72 @@
+"""Terminal views of a plan and of a run's outcome."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from rich.table import Table
+
+from acquisition.engine.frame_files import kept_bytes
+from acquisition.plan.plan import Plan, lamp_settings
+from acquisition.terminal.console import duration_text, out
+from instrument.config.load import Loaded
+
+if TYPE_CHECKING:
+    from acquisition.results.finish import Outcome
+
+
+def print_plan(loaded: Loaded, plan: Plan) -> None:
+    """Print the plan's totals and its view angles for each lamp setting."""
+    out.print(f"{loaded.protocol.name}: {loaded.protocol.description}", highlight=False)
+    table = Table("", "", show_header=False, box=None)
+    for row in _plan_rows(loaded, plan):
+        table.add_row(*row)
+    out.print(table)
+    lamp = Table("lamp", "theta_i (deg)", "dphi (deg)", "points", "view angles (deg)")
+    views_deg: dict[int, list[float]] = {}
+    for step in plan.points:
+        views_deg.setdefault(step.lamp_setting, []).append(step.pose.theta_r)
+    for number, theta_i, dphi in lamp_settings(plan):
+        own = views_deg.get(number, [])
+        span = f"{min(own):g} … {max(own):g}" if own else ""
+        lamp.add_row(str(number + 1), f"{theta_i:g}", f"{dphi:g}", str(len(own)), span)
+    out.print(lamp)
+
+
+def _plan_rows(loaded: Loaded, plan: Plan) -> Iterator[tuple[str, str]]:
+    tiles = sum(step.kind == "tile" for step in plan.steps)
+    drifts = sum(step.kind == "drift" for step in plan.steps)
+    yield "rig", f"{loaded.rig.name} ({loaded.rig.kind})"
+    yield "geometries", f"{len(plan.points)} to measure"
+    hidden = ", ".join(f"({p.theta_i:g}, {p.dphi:g}, {p.theta_r:g})" for p in plan.hidden[:6])
+    more = " …" if len(plan.hidden) > 6 else ""
+    yield (
+        "left out",
+        f"{len(plan.hidden)} where camera and lamp hide one another"
+        + (f": (theta_i, dphi, theta_r) = {hidden}{more}" if hidden else ""),
+    )
+    yield "references", f"{tiles} white tile, {drifts} drift checks"
+    yield (
+        "operator",
+        f"places sample or tile {plan.swaps} times, sets the lamp {plan.hand_settings} times"
+        + (", covers it once" if plan.darks_first_s else ""),
+    )
+    if loaded.protocol.keep_frames:
+        yield "frames", f"all kept, {kept_bytes(plan, loaded) / 1e6:.0f} MB"
+    yield "duration", f"about {duration_text(plan.duration_s)}"
+
+
+def print_outcome(outcome: Outcome) -> None:
+    """Print the chosen model, its parameters with uncertainty, notes and the report's path."""
+    from acquisition.results.summary import value_text  # heavy: only after a scan
+
+    out.print(outcome.headline, highlight=False)
+    if outcome.parameters:
+        table = Table("parameter", "value ± u (k = 1)")
+        for parameter in outcome.parameters:
+            table.add_row(parameter.name, value_text(parameter))
+        out.print(table)
+    for note in outcome.notes:
+        out.print(f"- {note}", highlight=False)
+    out.print(f"report: {outcome.report}", highlight=False, soft_wrap=True)
