@@ -1,9 +1,13 @@
-"""Opens the driver that a rig file names; axes on the same port share its line."""
+"""Open the driver that a rig file names; axes on the same port share its line.
+
+`instrument.config.axes.Wired` lists the kinds of motor drivers. mypy checks that this module and
+`sim.emulated.bench` handle each of them; at run time a kind without a driver is an error.
+"""
 
 from __future__ import annotations
 
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, assert_never
 
 from drivers.lines.serial_line import Line
 from drivers.stages.motor_stage import Limits, MotorStage
@@ -52,11 +56,15 @@ class Lines(Closing):
 
 def open_stage(name: str, axis: Wired, port: str, lines: Lines) -> MotorStage:
     """The stage of an axis. Raises `DeviceError` where another device or none answers."""
-    if isinstance(axis, NewportAxis):
-        return _newport(name, axis, port, lines)
-    if isinstance(axis, ZaberAxis):
-        return _zaber(name, axis, port, lines)
-    return _oriental(name, axis, port, lines)
+    match axis:
+        case NewportAxis():
+            return _newport(name, axis, port, lines)
+        case ZaberAxis():
+            return _zaber(name, axis, port, lines)
+        case OrientalAxis():
+            return _oriental(name, axis, port, lines)
+        case _:
+            assert_never(axis)
 
 
 def _newport(name: str, axis: NewportAxis, port: str, lines: Lines) -> MotorStage:

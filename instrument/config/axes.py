@@ -1,6 +1,7 @@
 """The axes of a rig file: what drives each, within which limits, how fast, how well.
 
-Only here and in `acquisition.rig` does anything depend on the kind of a device.
+The driver of an axis matters only here, in `acquisition.rig`, and in the two modules that handle
+every member of `Wired`: `drivers.factory` and `sim.emulated.bench`.
 """
 
 from __future__ import annotations

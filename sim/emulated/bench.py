@@ -17,9 +17,10 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import assert_never
 
 from instrument.clock import Clock
-from instrument.config.axes import NewportAxis, Wired, ZaberAxis
+from instrument.config.axes import NewportAxis, OrientalAxis, Wired, ZaberAxis
 from instrument.config.camera import V4l2CameraConfig
 from instrument.devices import Image, Surface
 from sim.emulated.motor import Mechanics, Motor
@@ -124,11 +125,15 @@ class EmulatedBench:
 
 
 def _controller(axis: Wired, motor: Motor) -> Controller:
-    if isinstance(axis, NewportAxis):
-        return NewportController(motor, axis.address, axis.model)
-    if isinstance(axis, ZaberAxis):
-        return ZaberController(motor, axis.device, axis.microsteps_per_deg)
-    return OrientalController(motor, axis.unit, axis.steps_per_deg)
+    match axis:
+        case NewportAxis():
+            return NewportController(motor, axis.address, axis.model)
+        case ZaberAxis():
+            return ZaberController(motor, axis.device, axis.microsteps_per_deg)
+        case OrientalAxis():
+            return OrientalController(motor, axis.unit, axis.steps_per_deg)
+        case _:
+            assert_never(axis)
 
 
 def _described(camera: V4l2CameraConfig) -> Description:
