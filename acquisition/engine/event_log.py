@@ -12,10 +12,10 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from queue import Empty, SimpleQueue
 
+from instrument.record.event_kinds import RETRY, TROUBLE
 from instrument.record.record import Record
 
 SPEAKERS = ("drivers", "acquisition", "sim")
-RETRY, TROUBLE = "retry", "trouble"
 
 
 class EventLogHandler(logging.Handler):

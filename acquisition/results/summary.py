@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from acquisition.engine.event_log import RETRY
 from acquisition.results.fitting import Fitted, cost_of
 from acquisition.results.reduction import DARK, NOISE, ROUNDING, Reduced
 from analysis.fit.fit import FitResult
@@ -12,6 +11,7 @@ from analysis.report.data import Parameter
 from analysis.report.style import format_value
 from instrument.config.load import Loaded
 from instrument.geometry import FloatArray
+from instrument.record.event_kinds import RETRY
 from instrument.record.record import Record
 
 Budget = tuple[tuple[str, float, float], ...]

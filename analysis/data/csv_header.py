@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from analysis.data.csv_line import QuoteError, fields_of
 from analysis.data.text_file import TextFile, error_of, number
-from instrument.config.yaml_positions import printable
 from instrument.errors import InputError
+from instrument.text.quoting import printable
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,9 +26,9 @@ import numpy as np
 from analysis.data.csv_header import BRDF
 from analysis.data.measurements import Measurements
 from analysis.data.text_file import TextFile, error_of, number, read_text
-from instrument.config.yaml_positions import printable, shown
 from instrument.errors import InputError
 from instrument.geometry import FloatArray
+from instrument.text.quoting import printable, shown
 
 TABLE, VALUES = "table.txt", "abrdf.dat"
 

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from instrument.config.yaml_positions import printable, shown
 from instrument.errors import InputError
 from instrument.text.atomic_file import read_file
+from instrument.text.quoting import printable, shown
 
 MAX_BYTES = 64 * 1024**2  # some 400 000 rows of a run's measurements.csv
 MAX_LINES = 2_000_000

@@ -35,11 +35,10 @@ from instrument.config.yaml_positions import (
     kind_of,
     number_hint,
     plain_value,
-    printable,
     read_yaml,
-    shown,
 )
 from instrument.errors import InputError
+from instrument.text.quoting import printable, shown
 
 MAX_REPORTED = 200  # mistakes a file; more would only scroll the first ones away
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from instrument.config.yaml_positions import MAX_BYTES, printable
+from instrument.config.yaml_positions import MAX_BYTES
 from instrument.errors import InputError
 from instrument.text.atomic_file import read_file
+from instrument.text.quoting import printable
 
 
 def yaml_bytes(path: Path) -> bytes:

@@ -327,19 +327,6 @@ def kind_of(value: object) -> str:
     return "a block of keys"
 
 
-def shown(value: object) -> str:
-    """A value from YAML as a message shows it."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return repr(value if len(value) <= 40 else value[:40] + "...")
-    if isinstance(value, list):
-        return f"a list of {len(value)}"
-    if isinstance(value, dict):
-        return "a block of keys"
-    return "nothing" if value is None else str(value)
-
-
 def dotted(path: KeyPath) -> str:
     """A path as in `sweeps[0].theta_r_deg.num`; keys that are no plain words in quotes."""
     text = ""
@@ -350,11 +337,6 @@ def dotted(path: KeyPath) -> str:
             plain = key[:40] if key.isidentifier() else repr(key[:40])
             text += f".{plain}" if text else plain
     return text
-
-
-def printable(text: str) -> str:
-    """A name from outside, without what a terminal or a report could stumble over."""
-    return text if text.isprintable() else repr(text)
 
 
 def _mark(event: yaml.Event) -> Mark:

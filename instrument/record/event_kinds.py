@@ -1,0 +1,15 @@
+"""Kinds of events in the run record: the words of column `kind` in table `event`.
+
+They are stored in files and therefore never change.
+"""
+
+from typing import Final
+
+OPERATOR: Final = "operator"  # a prompt and the answer to it
+DRIFT: Final = "drift"  # a drift check at a resume, and its outcome
+RETRY: Final = "retry"  # a warning of a driver: an exchange was repeated, a frame discarded
+TROUBLE: Final = "trouble"  # an error of a driver that did not end the scan
+STOPPED: Final = "stopped"  # the operator ended the scan
+FAULT: Final = "fault"  # a device or the disk ended the scan
+RESUMED: Final = "resumed"  # the scan continued
+FINISHED: Final = "finished"  # the last step was accepted
