@@ -1,7 +1,7 @@
-"""A model's BRDF worked out no better than a picture needs.
+"""BRDF of a model with just the accuracy that a rendered picture needs.
 
-What to use when: `adequate_brdf` for a model whose values are drawn, not fitted; the model's own
-`brdf` where every digit counts.
+What to use when: `adequate_brdf` for a model whose values are rendered, not fitted; the model's own
+`brdf` where full accuracy is needed.
 """
 
 from __future__ import annotations
@@ -12,30 +12,30 @@ import numpy as np
 
 from analysis.accuracy.cheapest import cheapest
 from analysis.models import MODELS
-from analysis.models.rough.form_error import LIMIT_DEG
+from analysis.models.rough.form_error_table import LIMIT_DEG
 from instrument.geometry import Brdf, FloatArray, Geometry
 
 TOLERANCE = 3e-5
 """Relative, of each term: below a tenth of the noise of a window's mean (a few 1e-4), and a third
-of what picture and window together are allowed (1e-4)."""
+of the error allowed for picture and window together (1e-4)."""
 
 INTEGRATED = "oren_nayar_exact"
-"""The one model for which asking pays. Of a picture's geometries the smooth body's exact method
-costs no more than any other; and all values of `beckmann_spizzichino` cost about what it costs to
-ask which terms would do (measured: 18 ms, and 11 ms to ask)."""
+"""The one model for which the search pays. For a picture's geometries the smooth dielectric's exact
+method costs no more than any other; and all values of `beckmann_spizzichino` cost about as much as
+the search for the number of terms (measured: 18 ms, and 11 ms for the search)."""
 
 NEAR_GRAZING = 2e-4
-"""Beyond 85 degrees, where the exact model promises no more itself."""
+"""Relative tolerance beyond 85 degrees: the accuracy that the exact model itself states there."""
 
 _METHODS = ("table", "coarse", "exact")  # no form keeps TOLERANCE on a surface that is not a plane
-_CHECKS = 64  # geometries with which a doubt may be settled: pictures are too many to spend more
+_CHECKS = 64  # at most, of doubtful geometries: a scan renders many pictures
 
 
 def adequate_brdf(name: str, parameters: Mapping[str, float], tolerance: float = TOLERANCE) -> Brdf:
-    """The model's BRDF in 1/sr, by the cheapest method that keeps the tolerance in each scene.
+    """The model's BRDF in 1/sr, with `oren_nayar_exact` by the cheapest method within `tolerance`.
 
-    Of a rough surface's integral, that is; all else is as `MODELS` has it, to the bit. Raises
-    `KeyError` for an unknown model; the BRDF raises what the model does.
+    All other models and terms are those of `MODELS`, bit for bit. Raises `KeyError` for an unknown
+    model; the returned function raises the model's own errors.
     """
     model = MODELS[name]
     terms = model.terms or (model,)

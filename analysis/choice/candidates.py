@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.accuracy.cheapest import PHYSICS, cheapest
+from analysis.accuracy.cheapest import FAMILIES, cheapest
 from analysis.choice.ladder import SAME_PREDICTION, approximation
 from analysis.data.acceptance import Acceptance
 from analysis.data.measurements import Measurements
@@ -96,7 +96,7 @@ def _leaves_integral(form: FirstFit, measurements: Measurements) -> bool:
         u = np.full(measurements.size, float(np.sqrt(np.mean(np.square(left)))))
     allowed = np.divide(SAME_PREDICTION * u, np.abs(rough), out=np.ones_like(u), where=rough != 0)
     # Data without noise may ask for more than even the integral keeps.
-    allowed = np.maximum(allowed, PHYSICS["rough"].accuracy(measurements.geometry))
+    allowed = np.maximum(allowed, FAMILIES["rough"].accuracy(measurements.geometry))
     ranges = {name: (value, value) for name, value in at.items()}
     found = cheapest("rough", measurements.geometry, ranges, allowed, among=("functional",))
     return found.method != "functional"

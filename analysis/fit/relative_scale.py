@@ -59,7 +59,7 @@ def relative(model: Model, values: FloatArray) -> Model:
         per_brdf = parameters.pop(NAME)
         return per_brdf * model.kernel(geometry, **parameters)
 
-    def slopes(geometry: Geometry, **parameters: float) -> dict[str, FloatArray]:
+    def gradient(geometry: Geometry, **parameters: float) -> dict[str, FloatArray]:
         per_brdf = parameters.pop(NAME)
         own = {name: per_brdf * s for name, s in model.gradient(geometry, **parameters).items()}
         return {**own, NAME: np.asarray(model.kernel(geometry, **parameters))}
@@ -70,4 +70,11 @@ def relative(model: Model, values: FloatArray) -> Model:
         for p in model.parameters
     )
     parameters = (*own, factor)
-    return replace(model, parameters=parameters, kernel=kernel, slopes=slopes, holds=None, terms=())
+    return replace(
+        model,
+        parameters=parameters,
+        kernel=kernel,
+        gradient_kernel=gradient,
+        validity_kernel=None,
+        terms=(),
+    )

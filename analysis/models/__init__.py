@@ -1,7 +1,8 @@
 """Reflectance models by name: `MODELS["oren_nayar"].brdf(geometry, albedo=0.9, sigma_deg=30)`.
 
 A sum is written with `+`: `MODELS["oren_nayar+torrance_sparrow"]`; a parameter name that its parts
-share (`sigma_deg`) is one parameter of the sum.
+share (`sigma_deg`) is one parameter of the sum. Open `base` first: it defines a `Model`; the other
+modules, and those in `rough`, `smooth` and `specular`, hold the formulas.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from functools import cache
 
 from analysis.models.base import Model, Parameter, add
 from analysis.models.eon import EON
+from analysis.models.lambert import LAMBERT
 from analysis.models.minnaert import MINNAERT
-from analysis.models.rough.oren_nayar import LAMBERT, OREN_NAYAR, OREN_NAYAR_QUALITATIVE
+from analysis.models.rough.oren_nayar import OREN_NAYAR, OREN_NAYAR_QUALITATIVE
 from analysis.models.rough.oren_nayar_exact import OREN_NAYAR_EXACT
 from analysis.models.single_scattering import SINGLE_SCATTERING
 from analysis.models.smooth.wolff import WOLFF, WOLFF_OREN_NAYAR
@@ -44,10 +46,10 @@ _SINGLE = {m.name: m for m in _ALL}
 
 
 class _Models(Mapping[str, Model]):
-    """Read-only mapping name -> model; lists the single models, and gives any sum of them."""
+    """Read-only mapping name -> model; iterates the single models and accepts any sum of them."""
 
     def __getitem__(self, name: str) -> Model:
-        """The model of that name. Raises `KeyError` that lists the known ones."""
+        """Return the model or sum of that name. Raises `KeyError` that lists the known ones."""
         return _named(name)
 
     def __iter__(self) -> Iterator[str]:
@@ -67,7 +69,7 @@ def _named(name: str) -> Model:
             "and their sums, written with +"
         )
     if len(set(parts)) < len(parts):
-        raise KeyError(f"a model stands twice in {name!r}; a sum names each model once")
+        raise KeyError(f"a model stands twice in {name!r}; allowed: each model once in a sum")
     return _SINGLE[name] if len(parts) == 1 else add(*(_SINGLE[part] for part in parts))
 
 

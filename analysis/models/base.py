@@ -1,4 +1,4 @@
-"""What a reflectance model is: a name, its parameters with their bounds, and a kernel.
+"""Reflectance model: a name, parameters with bounds, and a kernel that computes the BRDF.
 
 To add a model: write its kernel (geometry and parameters in, BRDF out) in a module of its own,
 wrap it in a `Model`, and list that in `analysis/models/__init__.py`.
@@ -20,35 +20,38 @@ from instrument.geometry import BoolArray, FloatArray, Geometry
 Kernel = Callable[..., FloatArray]
 T = TypeVar("T", bound=FloatArray | tuple[FloatArray, ...])
 
+Ranges = Mapping[str, tuple[float, float]]
+"""Lowest and highest value of each parameter; a known one has them equal."""
+
 # Geometries in one block: a kernel's dozen arrays of them fit into a core's cache.
 BLOCK = 8192
 
 
-def kept(function: Callable[[Geometry], T]) -> Callable[[Geometry], T]:
-    """A function of the angles alone, kept as long as its geometry lives: fits ask often.
+def cached_per_geometry(function: Callable[[Geometry], T]) -> Callable[[Geometry], T]:
+    """Decorator: cache a function of the angles alone for as long as its geometry object lives.
 
-    The arrays that it returns, one or a tuple of them, cannot be written to. Those of more
-    geometries than two blocks are not kept.
+    Fits evaluate the same geometry often. The returned arrays, one or a tuple of them, of the
+    function's own shape and unit, are read-only. Geometries of more than two blocks are not cached.
     """
-    known: WeakKeyDictionary[Geometry, T] = WeakKeyDictionary()
+    cache: WeakKeyDictionary[Geometry, T] = WeakKeyDictionary()
 
     @wraps(function)
-    def looked_up(geometry: Geometry) -> T:
-        if geometry in known:
-            return known[geometry]
+    def cached(geometry: Geometry) -> T:
+        if geometry in cache:
+            return cache[geometry]
         value = function(geometry)
         if math.prod(geometry.shape) <= 2 * BLOCK:
             for array in value if isinstance(value, tuple) else (value,):
                 array.setflags(write=False)
-            known[geometry] = value
+            cache[geometry] = value
         return value
 
-    return looked_up
+    return cached
 
 
 @dataclass(frozen=True, slots=True)
 class Validity:
-    """Where a model holds: `mask` of the geometry's shape, and why it does not elsewhere."""
+    """Validity of a model: `mask`, True where it is valid, and the reason where it is not."""
 
     mask: BoolArray
     reason: str
@@ -56,13 +59,13 @@ class Validity:
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A parameter of a model: `low` and `high` bound its domain, both included.
+    """Parameter of a model: `low` and `high` bound its domain, both included.
 
-    `unit` is as people write it ("1" for a pure number). `scale` says that its part of the BRDF
-    rises about in proportion to it from zero: a fit then solves for its first value instead of
-    searching. `starts`: values from which a fit tries the search; none given: seven over the
-    domain, denser towards its low end, as narrow lobes are easier to miss than wide ones.
-    `logarithmic`: a fit searches for its logarithm; the domain then begins above 0.
+    `unit` is as people write it ("1" for a pure number). `scale`: its part of the BRDF rises about
+    in proportion to it from zero, so that a fit solves for its first value instead of searching.
+    `starts`: values from which a fit starts the search; by default seven over the domain, denser
+    towards its low end, as narrow lobes are easier to miss than wide ones. `logarithmic`: a fit
+    searches for its logarithm; the domain then begins above 0.
     """
 
     name: str
@@ -77,7 +80,7 @@ class Parameter:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
             raise ValueError(
-                f"{self.name}: bounds {self.low:g} to {self.high:g} are not finite and rising"
+                f"{self.name}: bounds {self.low:g} to {self.high:g} are not finite, or low >= high"
             )
         for value in (self.default, *self.starts):
             self.check(value)
@@ -87,11 +90,13 @@ class Parameter:
             object.__setattr__(self, "starts", starts)
         if self.scale and not 0 <= self.low < self.default:
             raise ValueError(
-                f"{self.name}: a scale has a lower bound of 0 or more and a default above it; "
-                f"got {self.low:g} and {self.default:g}"
+                f"{self.name}: lower bound {self.low:g}, default {self.default:g}; allowed for a "
+                "scale: a lower bound of 0 or more and a default above it"
             )
         if self.logarithmic and self.low <= 0:
-            raise ValueError(f"{self.name}: logarithmic, so its domain begins above {self.low:g}")
+            raise ValueError(
+                f"{self.name}: lower bound {self.low:g}; allowed, as it is logarithmic: above 0"
+            )
 
     def check(self, value: float) -> float:
         """Return the value as a float, or raise `ValueError` when it is not in the domain."""
@@ -112,28 +117,29 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A reflectance model: call `brdf`; `kernel` is the bare formula, without checks.
+    """Reflectance model: call `brdf`; `kernel` is the bare formula, without checks.
 
-    `slopes`: kernel of the derivatives by each parameter, name -> array, in closed form or under
-    the integral; None: `gradient` then takes central differences. `holds`: kernel of `validity`;
-    None: the model holds wherever it is defined. `in_blocks`: large arrays go through the kernel
-    in blocks that stay in the processor's cache, which takes two thirds of the time; not for a
-    kernel that keeps what belongs to a whole set of geometries. `terms`: the models of a sum.
+    `gradient_kernel`: derivatives by each parameter, name -> array, in closed form or under the
+    integral; None: `gradient` takes central differences. `validity_kernel`: None: the model is
+    valid wherever it is defined. `in_blocks`: large arrays go through the kernel in blocks that
+    stay in the processor's cache, which takes two thirds of the time; not for a kernel that caches
+    a whole set of geometries. `terms`: the models of a sum.
     """
 
     name: str
     parameters: tuple[Parameter, ...]
     kernel: Kernel
-    slopes: Callable[..., dict[str, FloatArray]] | None = None
-    holds: Callable[..., Validity] | None = None
+    gradient_kernel: Callable[..., dict[str, FloatArray]] | None = None
+    validity_kernel: Callable[..., Validity] | None = None
     in_blocks: bool = True
     terms: tuple[Model, ...] = ()
 
     def brdf(self, geometry: Geometry, **parameters: float) -> FloatArray:
         """BRDF in 1/sr, float64, of the geometry's shape.
 
-        Takes every parameter by name. Raises `ValueError`, naming the argument, its value and
-        what is allowed, for one that is unknown, missing, not finite or out of its domain.
+        Takes every parameter by name, a scalar in its unit. Raises `ValueError`, naming the
+        argument, its value and what is allowed, for one that is unknown, missing, not finite or out
+        of its domain.
         """
         values = self._checked(parameters)
         if not self.in_blocks or math.prod(geometry.shape) <= 2 * BLOCK:
@@ -144,21 +150,25 @@ class Model:
         return flat.reshape(geometry.shape)
 
     def gradient(self, geometry: Geometry, **parameters: float) -> dict[str, FloatArray]:
-        """Derivatives of the BRDF by each parameter, in 1/sr per unit of it, by name.
+        """Derivatives of the BRDF by each parameter, by name.
+
+        Each is of the geometry's shape, in 1/sr per unit of the parameter. Raises `ValueError` as
+        `brdf` does.
+        """
+        values = self._checked(parameters)
+        if self.gradient_kernel is not None:
+            return self.gradient_kernel(geometry, **values)
+        return {p.name: self._difference(geometry, values, p) for p in self.parameters}
+
+    def validity(self, geometry: Geometry, **parameters: float) -> Validity:
+        """Mask of the geometry's shape, True where the model is valid, and the reason elsewhere.
 
         Raises `ValueError` as `brdf` does.
         """
         values = self._checked(parameters)
-        if self.slopes is not None:
-            return self.slopes(geometry, **values)
-        return {p.name: self._difference(geometry, values, p) for p in self.parameters}
-
-    def validity(self, geometry: Geometry, **parameters: float) -> Validity:
-        """Where the model holds, and why not elsewhere. Raises `ValueError` as `brdf` does."""
-        values = self._checked(parameters)
-        if self.holds is None:
+        if self.validity_kernel is None:
             return Validity(np.ones(geometry.shape, dtype=bool), "")
-        return self.holds(geometry, **values)
+        return self.validity_kernel(geometry, **values)
 
     def _difference(
         self, geometry: Geometry, values: Mapping[str, float], parameter: Parameter
@@ -187,7 +197,7 @@ class Model:
 
 
 def add(*models: Model) -> Model:
-    """Sum of models, called `a+b`: a parameter name that they share is one parameter of the sum.
+    """Sum of models, named `a+b`: a parameter name that they share is one parameter of the sum.
 
     Its domain is the intersection of theirs. Raises `ValueError` when that is empty or the units
     differ.
@@ -202,25 +212,31 @@ def add(*models: Model) -> Model:
         parts = (f(geometry, **{n: parameters[n] for n in names}) for f, names in terms)
         return reduce(np.add, parts)
 
-    def slopes(geometry: Geometry, **parameters: float) -> dict[str, FloatArray]:
+    def own(model: Model, parameters: Mapping[str, float]) -> dict[str, float]:
+        return {p.name: parameters[p.name] for p in model.parameters}
+
+    def gradient(geometry: Geometry, **parameters: float) -> dict[str, FloatArray]:
         total: dict[str, FloatArray] = {}
         for model in models:
-            own = model.gradient(geometry, **{p.name: parameters[p.name] for p in model.parameters})
-            for name, slope in own.items():
-                total[name] = total[name] + slope if name in total else slope
+            for name, by in model.gradient(geometry, **own(model, parameters)).items():
+                total[name] = total[name] + by if name in total else by
         return total
 
-    def holds(geometry: Geometry, **parameters: float) -> Validity:
-        each = [
-            model.validity(geometry, **{p.name: parameters[p.name] for p in model.parameters})
-            for model in models
-        ]
+    def validity(geometry: Geometry, **parameters: float) -> Validity:
+        each = [model.validity(geometry, **own(model, parameters)) for model in models]
         reasons = dict.fromkeys(v.reason for v in each if v.reason)
         return Validity(np.all([v.mask for v in each], axis=0), "; ".join(reasons))
 
     name = "+".join(m.name for m in models)
-    whole = all(model.in_blocks for model in models)
-    return Model(name, tuple(shared.values()), kernel, slopes, holds, in_blocks=whole, terms=models)
+    return Model(
+        name,
+        tuple(shared.values()),
+        kernel,
+        gradient,
+        validity,
+        in_blocks=all(model.in_blocks for model in models),
+        terms=models,
+    )
 
 
 def _intersection(a: Parameter, b: Parameter) -> Parameter:

@@ -14,9 +14,9 @@ import math
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity, kept
-from analysis.models.rough.oren_nayar import ALBEDO
-from analysis.models.validity import GRAZING, both_graze, held
+from analysis.models.base import Model, Parameter, Validity, cached_per_geometry
+from analysis.models.lambert import ALBEDO
+from analysis.models.validity import GRAZING, both_graze, valid_except
 from instrument.geometry import FloatArray, Geometry
 
 ROUGHNESS = Parameter("roughness", "1", 0.0, 1.0, 0.3)
@@ -58,10 +58,10 @@ def eon_gradient(geometry: Geometry, albedo: float, roughness: float) -> dict[st
     }
 
 
-def eon_holds(geometry: Geometry, albedo: float, roughness: float) -> Validity:
+def eon_validity(geometry: Geometry, albedo: float, roughness: float) -> Validity:
     """Everywhere but where lamp and camera both graze the surface on one side."""
     endless = both_graze(geometry) & (geometry.cos_dphi > 0) & (albedo * roughness > 0)
-    return held(geometry, (endless, GRAZING))
+    return valid_except(geometry, (endless, GRAZING))
 
 
 def directional_albedo(theta: FloatArray, roughness: float) -> FloatArray:
@@ -77,7 +77,7 @@ def _multiple_albedo(albedo: float, roughness: float) -> tuple[float, float, flo
     return albedo**2 * E / rest, by_albedo, albedo**2 * (1 - albedo) / rest**2
 
 
-@kept
+@cached_per_geometry
 def _s_over_t(geometry: Geometry) -> FloatArray:
     theta_i, theta_r = geometry.theta_i, geometry.theta_r
     s = geometry.cos_dphi * np.sin(theta_i) * np.sin(theta_r)
@@ -86,7 +86,7 @@ def _s_over_t(geometry: Geometry) -> FloatArray:
     return np.asarray(np.maximum(s / t, -1.0))
 
 
-@kept
+@cached_per_geometry
 def _shape(geometry: Geometry) -> FloatArray:
     """(1 - E_i)(1 - E_r)/(1 - E) over A r."""
     return np.asarray(_loss(geometry.theta_i) * _loss(geometry.theta_r) / (_C1 - _C2))
@@ -103,4 +103,4 @@ def _loss(theta: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(_C1 - G / np.pi, 0.0))
 
 
-EON = Model("eon", (ALBEDO, ROUGHNESS), eon_brdf, eon_gradient, eon_holds)
+EON = Model("eon", (ALBEDO, ROUGHNESS), eon_brdf, eon_gradient, eon_validity)

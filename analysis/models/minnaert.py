@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity
-from analysis.models.rough.oren_nayar import ALBEDO
-from analysis.models.validity import held
+from analysis.models.lambert import ALBEDO
+from analysis.models.validity import valid_except
 from instrument.geometry import FloatArray, Geometry
 
 K = Parameter("k", "1", 0.0, 2.0, 1.0)
@@ -42,10 +42,10 @@ def minnaert_gradient(geometry: Geometry, albedo: float, k: float) -> dict[str, 
     }
 
 
-def minnaert_holds(geometry: Geometry, albedo: float, k: float) -> Validity:
+def minnaert_validity(geometry: Geometry, albedo: float, k: float) -> Validity:
     """Within the paper's k, and where no more light leaves than came, either way round."""
     least = np.minimum(np.cos(geometry.theta_i), np.cos(geometry.theta_r))
-    return held(
+    return valid_except(
         geometry,
         (k > 1, _BEYOND_PAPER),
         (albedo * np.power(least, k - 1) > 1, _TOO_BRIGHT),
@@ -57,4 +57,4 @@ def _product(geometry: Geometry) -> FloatArray:
     return np.asarray(np.cos(geometry.theta_i) * np.cos(geometry.theta_r))
 
 
-MINNAERT = Model("minnaert", (ALBEDO, K), minnaert_brdf, minnaert_gradient, minnaert_holds)
+MINNAERT = Model("minnaert", (ALBEDO, K), minnaert_brdf, minnaert_gradient, minnaert_validity)

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity, kept
-from analysis.models.validity import GRAZING, both_graze, held
+from analysis.models.base import Model, Parameter, Validity, cached_per_geometry
+from analysis.models.validity import GRAZING, both_graze, valid_except
 from instrument.geometry import FloatArray, Geometry
 
 # A single-scattering albedo up to 1; above, light scattered more than once goes the same way.
@@ -50,10 +50,10 @@ def single_scattering_gradient(
     return {"scattering": per_scattering, "asymmetry": scattering * per_scattering * growth}
 
 
-def single_scattering_holds(geometry: Geometry, scattering: float, asymmetry: float) -> Validity:
+def single_scattering_validity(geometry: Geometry, scattering: float, asymmetry: float) -> Validity:
     """Where particles scatter no more than they receive, and not where both directions graze."""
     del asymmetry  # where it holds does not depend on it
-    return held(
+    return valid_except(
         geometry,
         (both_graze(geometry) & (scattering > 0), GRAZING),
         (scattering > 1, "scattering above 1: particles would send out more than they receive"),
@@ -66,7 +66,7 @@ def _denominators(geometry: Geometry, g: float) -> tuple[FloatArray, FloatArray]
     return cos_sum, np.asarray(1 + g * g + 2 * g * _cos_gamma(geometry))
 
 
-@kept
+@cached_per_geometry
 def _cos_gamma(geometry: Geometry) -> FloatArray:
     """Cosine of the angle between the directions to the lamp and to the camera."""
     across = np.sin(geometry.theta_i) * np.sin(geometry.theta_r) * geometry.cos_dphi
@@ -78,5 +78,5 @@ SINGLE_SCATTERING = Model(
     (SCATTERING, ASYMMETRY),
     single_scattering_brdf,
     single_scattering_gradient,
-    single_scattering_holds,
+    single_scattering_validity,
 )

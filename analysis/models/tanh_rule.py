@@ -1,4 +1,4 @@
-"""One quadrature rule for integrands with singular or nearly singular ends.
+"""Quadrature rule (tanh rule) on 0 to 1 for integrands with singular or nearly singular ends.
 
 `x = 1 / (1 + e^-s)` maps the line onto 0 to 1, and the trapezoidal rule in s converges
 exponentially. Near an end s counts decades: a logarithm there, or a pole at any small distance off

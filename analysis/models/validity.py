@@ -1,4 +1,4 @@
-"""Where the formulas end: what the models' `holds` kernels share, and the angles of the others."""
+"""Helpers for the models' validity kernels, and the range check of polar angles."""
 
 from __future__ import annotations
 
@@ -13,30 +13,33 @@ NEGATIVE = "negative as printed, far forward at high roughness"
 
 
 def both_graze(geometry: Geometry) -> BoolArray:
-    """Where lamp and camera both lie in the sample's plane: 1/cos and tan(beta) have no limit."""
+    """Mask of the geometry's shape: lamp and camera both at 90 degrees (no limit of 1/cos)."""
     return np.asarray(np.minimum(geometry.theta_i_deg, geometry.theta_r_deg) >= 90.0)
 
 
 def either_grazes(geometry: Geometry) -> BoolArray:
-    """Where lamp or camera lies in the sample's plane."""
+    """Mask of the geometry's shape: lamp or camera at 90 degrees."""
     return np.asarray(np.maximum(geometry.theta_i_deg, geometry.theta_r_deg) >= 90.0)
 
 
-def held(geometry: Geometry, *failures: tuple[BoolArray | bool, str]) -> Validity:
-    """Validity from pairs (where it fails, why): the reasons are those that occur."""
+def valid_except(geometry: Geometry, *failures: tuple[BoolArray | bool, str]) -> Validity:
+    """Validity from pairs (mask of failures, reason), masks of the geometry's shape or scalar.
+
+    The reason lists those that occur.
+    """
     mask = np.ones(geometry.shape, dtype=bool)
     reasons = []
-    for where, why in failures:
-        if np.any(where):
-            mask &= ~np.asarray(where)
-            reasons.append(why)
+    for fails, reason in failures:
+        if np.any(fails):
+            mask &= ~np.asarray(fails)
+            reasons.append(reason)
     return Validity(mask, "; ".join(reasons))
 
 
 def polar(name: str, angle: ArrayLike) -> FloatArray:
-    """The angle from a normal, in radians. Raises `ValueError` for one outside 0 to pi/2."""
+    """Polar angle in radians, any shape, as floats. Raises `ValueError` outside 0 to pi/2."""
     angle = np.asarray(angle, dtype=np.float64)
-    fine = (angle >= 0) & (angle <= np.pi / 2)
-    if not np.all(fine):
-        raise ValueError(f"{name} = {angle[~fine].flat[0]:.12g} radians; allowed: 0 to pi/2")
+    allowed = (angle >= 0) & (angle <= np.pi / 2)
+    if not np.all(allowed):
+        raise ValueError(f"{name} = {angle[~allowed].flat[0]:.12g} radians; allowed: 0 to pi/2")
     return angle

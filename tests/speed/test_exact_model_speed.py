@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from analysis.models import MODELS
-from analysis.models.rough.oren_nayar_exact import FINE, forget, oren_nayar_exact_brdf
+from analysis.models.rough.oren_nayar_exact import FINE, clear_profile_cache, oren_nayar_exact_brdf
 from instrument.geometry import Geometry
 from tests.support.cpu_time import cpu_seconds
 
@@ -56,7 +56,7 @@ def test_a_first_evaluation_costs_at_most_that_of_two_thousand_functional_ones(
     everywhere: Geometry,
 ) -> None:
     def first() -> None:
-        forget()
+        clear_profile_cache()
         EXACT.brdf(everywhere, albedo=0.8, sigma_deg=20.0)
 
     assert cpu_seconds(first, 2) < 2000 * functional(everywhere)
@@ -72,4 +72,4 @@ def test_another_sigma_costs_at_most_that_of_twelve_functional_ones(everywhere: 
 
     assert cpu_seconds(again, 15) < 12 * functional(everywhere)
     check(everywhere, 33.0)
-    forget()
+    clear_profile_cache()

@@ -69,9 +69,9 @@ def test_the_ladder_and_an_exact_candidate_cost_a_few_of_lmfit_s_fits(scan: Meas
     exact: list[FitResult] = []
 
     def fit_exact() -> None:
-        from analysis.models.rough.oren_nayar_exact import forget
+        from analysis.models.rough.oren_nayar_exact import clear_profile_cache
 
-        forget()
+        clear_profile_cache()
         exact.append(fit(MODELS["oren_nayar_exact"], scan))
 
     assert cpu_seconds(fit_exact, 2) < 100 * ruler

@@ -1,7 +1,7 @@
 """Maps of where methods fail: each approximation, each fit, the window.
 
 What to use when: `draw_maps` for all of them, as `gonio bench --maps` shows them. The regions are
-those that the program itself goes by: the departure from the integral, the bounds of
+those that the program itself goes by: the error against the integral, the bounds of
 `analysis.accuracy.method`, the condition of a fit, the window's pixels.
 """
 
@@ -25,10 +25,11 @@ from acquisition.benchmark.maps.map_style import (
     say_why,
 )
 from acquisition.benchmark.maps.window_map import window_picture
-from analysis.accuracy.failure_maps import ORDERS, TERMS, lobe_sums
+from analysis.accuracy.beckmann_lobe import TERMS, lobe_sums
 from analysis.accuracy.identifiability import LIMIT, condition_map
-from analysis.accuracy.methods_smooth import EPSILON, order_bound, polynomial_bound
-from analysis.models.rough.form_error import LIMIT_DEG, departure
+from analysis.accuracy.smooth_dielectric import EPSILON, ORDERS, order_bound, polynomial_bound
+from analysis.models.rough.form_error import form_error
+from analysis.models.rough.form_error_table import LIMIT_DEG
 from analysis.models.specular.beckmann_spizzichino import poisson_sum
 from analysis.report.style import INK, svg_of
 from instrument.geometry import FloatArray, Geometry
@@ -122,7 +123,7 @@ def rough_errors(name: str, theta_i_deg: float, dphi_deg: float) -> FloatArray:
     """Errors of a form in percent over roughness and signed view angle, (sigma, theta_r)."""
     geometry = Geometry.from_degrees(theta_i=theta_i_deg, theta_r=_VIEWS_DEG, dphi=dphi_deg)
     rows = [
-        [np.abs(departure(name, geometry, albedo, float(sigma))) for albedo in _ALBEDOS]
+        [np.abs(form_error(name, geometry, albedo, float(sigma))) for albedo in _ALBEDOS]
         for sigma in _SIGMAS_DEG
     ]
     return np.asarray(100 * np.max(rows, axis=1))

@@ -170,7 +170,7 @@ def with_scales(problem: Problem, start: FloatArray) -> FloatArray:
 
 def without_gradient(model: Model) -> Model:
     """The model without derivatives of its own: central differences in their place."""
-    return replace(model, slopes=None)
+    return replace(model, gradient_kernel=None)
 
 
 def _least_squares(

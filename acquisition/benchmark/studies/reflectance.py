@@ -20,13 +20,13 @@ from acquisition.benchmark.study import Study
 from acquisition.benchmark.timing import Timed, timed
 from acquisition.benchmark.trial import Trial
 from analysis.models import MODELS
-from analysis.models.rough.form_error import integral
+from analysis.models.rough.form_error_table import tabulated_brdf
 from analysis.models.rough.oren_nayar_exact import (
     COARSE,
     FINE,
     RULE,
     Rule,
-    forget,
+    clear_profile_cache,
     oren_nayar_exact_brdf,
 )
 from analysis.models.smooth.chandrasekhar import h_order
@@ -93,7 +93,7 @@ ROUGH: tuple[Method, ...] = (
     Method("closed form", "Lambert", _lambert),
     Method("closed form", "qualitative (36)", _named("oren_nayar_qualitative")),
     Method("closed form", FUNCTIONAL, _named("oren_nayar"), default=True),
-    Method("table", "table", integral, note="cubic splines over four angles"),
+    Method("table", "table", tabulated_brdf, note="cubic splines over four angles"),
     *(
         Method(
             "exact, angles known", f"exact {accuracy}", _exact(rule), accuracy == "1e-6",
@@ -103,7 +103,8 @@ ROUGH: tuple[Method, ...] = (
     ),
     *(
         Method(
-            "exact, first time", f"exact {accuracy}, first", _exact(rule), before=forget,
+            "exact, first time", f"exact {accuracy}, first", _exact(rule),
+            before=clear_profile_cache,
             note="angles met for the first time",
         )
         for accuracy, rule in _RULES.items()
@@ -194,7 +195,7 @@ def rough_study(effort: Effort) -> Study:
         for n, sigma_deg in enumerate(SIGMAS_DEG):
             time = run(method, batch, effort.repeats, ALBEDO, sigma_deg)
             trials.append(_trial(name, f"σ = {sigma_deg:g}°", method, time, true[n]))
-    forget()
+    clear_profile_cache()
     trials.sort(key=lambda t: float(t.scene.strip("σ =°")))
     return Study(
         name,

@@ -1,8 +1,7 @@
-"""Diffuse models: Lambert's, and Oren and Nayar's for V-cavities with Gaussian slopes.
+"""The printed models of Oren and Nayar, with their validity: `oren_nayar` and its qualitative form.
 
-What to use when: `lambert` for a smooth matte surface; `oren_nayar_qualitative` where speed rules
-or only the shape of the backscatter matters (forward it can be twice the integral); `oren_nayar`
-for measurements (it keeps within about 2 % of the integral over most of the plane of incidence).
+The formulas (33), (34) and (36) stand in `oren_nayar_forms`. This module adds where they are
+valid: not negative, finite, and within a fifth of the exact integral (`form_bounds`).
 
 Source: M. Oren, S. K. Nayar, "Generalization of the Lambertian Model and Implications for Machine
 Vision", International Journal of Computer Vision 14 (1995), sections 4.3 and 4.4.
@@ -14,141 +13,67 @@ import math
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity, kept
-from analysis.models.validity import GRAZING, NEGATIVE, both_graze, held
-from instrument.geometry import BoolArray, FloatArray, Geometry
-
-ALBEDO = Parameter("albedo", "1", 0.0, 1.0, 0.5, scale=True)
-SIGMA_DEG = Parameter("sigma_deg", "degrees", 0.0, 60.0, 20.0)
-
-PRINTED = 0.33
-"""The constant of C1 in (36): footnote 11 has another."""
+from analysis.models.base import Model, Validity
+from analysis.models.lambert import ALBEDO
+from analysis.models.rough.form_bounds import tight_bound
+from analysis.models.rough.oren_nayar_forms import (
+    PRINTED,
+    SIGMA_DEG,
+    oren_nayar_brdf,
+    oren_nayar_gradient,
+    oren_nayar_qualitative_brdf,
+    oren_nayar_qualitative_gradient,
+    relative_to_lambert,
+    roughness_terms,
+)
+from analysis.models.validity import GRAZING, NEGATIVE, both_graze, valid_except
+from instrument.geometry import BoolArray, Geometry
 
 VALID = 0.2
-"""How far a printed form may be off the integral where it is said to hold."""
+"""Largest relative error against the integral at which a printed form counts as valid."""
 
 _OFF = "more than a fifth off the integral: shadow, masking and interreflection beyond the fit"
-_UNKNOWN = "nearer to grazing than 85 degrees, where its departure from the integral is not mapped"
+_UNKNOWN = "nearer to grazing than 85 degrees, where the error against the integral is not mapped"
 _FORWARD = "forward, where (36) leaves out more than a fifth of itself: up to twice the integral"
 
 
-def lambert_brdf(geometry: Geometry, albedo: float) -> FloatArray:
-    """Lambert's BRDF in 1/sr: albedo / pi, the same in every direction."""
-    return np.full(geometry.shape, albedo / np.pi)
-
-
-def lambert_gradient(geometry: Geometry, albedo: float) -> dict[str, FloatArray]:
-    """Derivative of `lambert_brdf` by the albedo."""
-    del albedo  # the slope is the same at every albedo
-    return {"albedo": np.full(geometry.shape, 1 / np.pi)}
-
-
-def oren_nayar_qualitative_brdf(
-    geometry: Geometry, albedo: float, sigma_deg: float, constant: float = PRINTED
-) -> FloatArray:
-    """Oren and Nayar's qualitative BRDF in 1/sr: 1995, equation (36), over E0 cos(theta_i).
-
-    `sigma_deg` is the standard deviation of the facets' slope angle. No masking of the far slope,
-    no interreflection; a `constant` of 0.57 partly makes up for the latter (footnote 11). Never
-    negative; reciprocal; Lambert's at sigma = 0. At albedo 1 it reflects up to 1.015 of the light
-    (sigma 11 degrees, grazing incidence). As printed it grows without limit where lamp and camera
-    both graze the surface on one side (tan beta).
-    """
-    sigma2 = math.radians(sigma_deg) ** 2
-    A = 1 - 0.5 * sigma2 / (sigma2 + constant)
-    B = 0.45 * sigma2 / (sigma2 + 0.09)
-    return (albedo / np.pi) * (A + B * _backward_lobe(geometry))
-
-
-def oren_nayar_qualitative_gradient(
-    geometry: Geometry, albedo: float, sigma_deg: float, constant: float = PRINTED
-) -> dict[str, FloatArray]:
-    """Derivatives of `oren_nayar_qualitative_brdf` by albedo, and by sigma in 1/degree."""
-    sigma = math.radians(sigma_deg)
-    lobe = _backward_lobe(geometry)
-    dA, dB = -0.5 * _saturation_gradient(sigma, constant), 0.45 * _saturation_gradient(sigma, 0.09)
-    return {
-        "albedo": oren_nayar_qualitative_brdf(geometry, 1.0, sigma_deg, constant),
-        "sigma_deg": (albedo / np.pi) * (dA + dB * lobe),
-    }
-
-
-def oren_nayar_qualitative_holds(
+def oren_nayar_qualitative_validity(
     geometry: Geometry, albedo: float, sigma_deg: float, constant: float = PRINTED
 ) -> Validity:
-    """Where (36) keeps the terms that matter: not far forward, where (33) has a negative C2.
+    """Validity of (36): not far forward, where (33) has a negative C2 that (36) leaves out.
 
-    And where it is, as printed, within a fifth of the integral, as far as that is mapped.
+    With the printed constant also within a fifth of the integral, as far as that is mapped.
+    Arguments as in `Model.brdf`.
     """
     printed = constant == PRINTED
     sigma2 = math.radians(sigma_deg) ** 2
     A = 1 - 0.5 * sigma2 / (sigma2 + constant)
     left_out = -sigma2 / (sigma2 + 0.09) * roughness_terms(geometry)
-    return held(
+    return valid_except(
         geometry,
         ((geometry.cos_dphi < 0) & (left_out > 0.2 * A), _FORWARD),
         (both_graze(geometry) & (geometry.cos_dphi >= 0) & (sigma2 > 0), GRAZING),
-        *(_departures("oren_nayar_qualitative", geometry, albedo, sigma_deg) if printed else ()),
+        *(_form_errors("oren_nayar_qualitative", geometry, albedo, sigma_deg) if printed else ()),
     )
 
 
-def oren_nayar_brdf(geometry: Geometry, albedo: float, sigma_deg: float) -> FloatArray:
-    """Oren and Nayar's functional BRDF in 1/sr: 1995, equations (33) + (34), over E0 cos(theta_i).
+def oren_nayar_validity(geometry: Geometry, albedo: float, sigma_deg: float) -> Validity:
+    """Validity of (33) + (34): not negative, finite, and within a fifth of the integral.
 
-    `sigma_deg` is the standard deviation of the facets' slope angle. Direct light (33) and light
-    of two bounces (34), both fitted by their authors to numerical integrals. Reciprocal;
-    Lambert's at sigma = 0. At albedo 1 it reflects up to 1.051 of the light (sigma 17 degrees,
-    grazing incidence; 1.013 up to 75 degrees). As printed it is negative far forward at high
-    roughness (60 degrees, from 77/77 degrees on), and grows without limit where lamp and camera
-    both graze the surface.
+    The last as far as it is mapped. Arguments as in `Model.brdf`.
     """
-    return (albedo / np.pi) * _relative_to_lambert(geometry, albedo, sigma_deg)
-
-
-def _relative_to_lambert(geometry: Geometry, albedo: float, sigma_deg: float) -> FloatArray:
-    sigma2 = math.radians(sigma_deg) ** 2
-    C1 = 1 - 0.5 * sigma2 / (sigma2 + 0.33)
-    direct = C1 + sigma2 / (sigma2 + 0.09) * roughness_terms(geometry)
-    twice = 0.17 * albedo * sigma2 / (sigma2 + 0.13) * _second_bounce(geometry)
-    return np.asarray(direct + twice)
-
-
-def oren_nayar_gradient(
-    geometry: Geometry, albedo: float, sigma_deg: float
-) -> dict[str, FloatArray]:
-    """Derivatives of `oren_nayar_brdf` by albedo, and by sigma in 1/degree."""
-    sigma = math.radians(sigma_deg)
-    bounce = 0.17 * _second_bounce(geometry)
-    dC1, d_rough = sigma_terms_gradient(sigma_deg)
-    d_direct = dC1 + d_rough * roughness_terms(geometry)
-    d_twice = albedo * _saturation_gradient(sigma, 0.13) * bounce
-    once_more = albedo * sigma**2 / (sigma**2 + 0.13) * bounce  # (34) has albedo squared
-    return {
-        "albedo": (_relative_to_lambert(geometry, albedo, sigma_deg) + once_more) / np.pi,
-        "sigma_deg": (albedo / np.pi) * (d_direct + d_twice),
-    }
-
-
-def oren_nayar_holds(geometry: Geometry, albedo: float, sigma_deg: float) -> Validity:
-    """Where (33) + (34) are a reflectance, not negative and finite, and near the integral.
-
-    Near: within a fifth, as far as that is mapped.
-    """
-    return held(
+    return valid_except(
         geometry,
-        (_relative_to_lambert(geometry, albedo, sigma_deg) < 0, NEGATIVE),
+        (relative_to_lambert(geometry, albedo, sigma_deg) < 0, NEGATIVE),
         (both_graze(geometry) & (sigma_deg > 0), GRAZING),
-        *_departures("oren_nayar", geometry, albedo, sigma_deg),
+        *_form_errors("oren_nayar", geometry, albedo, sigma_deg),
     )
 
 
-def _departures(
+def _form_errors(
     name: str, geometry: Geometry, albedo: float, sigma_deg: float
 ) -> tuple[tuple[BoolArray, str], ...]:
-    """Where a form may be off the integral by more than VALID, or nobody knows, and why."""
-    # The bounds are made of this module's forms.
-    from analysis.accuracy.rough_surface import tight_bound
-
+    """Geometries where a form may be off the integral by more than VALID or is not mapped."""
     if sigma_deg == 0:
         return ()  # a plane: all forms are Lambert's law
     ranges = {"albedo": (albedo, albedo), "sigma_deg": (sigma_deg, sigma_deg)}
@@ -156,62 +81,13 @@ def _departures(
     return (np.isfinite(bound) & (bound > VALID), _OFF), (np.isinf(bound), _UNKNOWN)
 
 
-@kept
-def roughness_terms(geometry: Geometry) -> FloatArray:
-    """What (33) multiplies with sigma^2 / (sigma^2 + 0.09): its terms of C2 and C3.
-
-    cos(dphi) C2 tan(beta) + (1 - |cos(dphi)|) C3 tan((alpha + beta)/2), where b = 2 beta/pi,
-    C2 = 0.45 (sin(alpha) - [cos(dphi) < 0] b^3) and C3 = 0.125 (4 alpha beta / pi^2)^2.
-    """
-    cos_dphi = geometry.cos_dphi
-    alpha, beta = _larger_and_smaller(geometry)
-    b = beta * (2 / np.pi)
-    C2 = 0.45 * (np.sin(alpha) - np.where(cos_dphi >= 0, 0.0, b * b * b))
-    C3 = 0.125 * np.square(alpha * b * (2 / np.pi))
-    result: FloatArray = cos_dphi * C2 * np.tan(beta)
-    result += (1 - np.abs(cos_dphi)) * C3 * np.tan((alpha + beta) / 2)
-    return result
-
-
-def sigma_terms_gradient(sigma_deg: float) -> tuple[float, float]:
-    """Derivatives in 1/degree of C1 and of the sigma^2 / (sigma^2 + 0.09) of C2 and C3."""
-    sigma = math.radians(sigma_deg)
-    return -0.5 * _saturation_gradient(sigma, 0.33), _saturation_gradient(sigma, 0.09)
-
-
-@kept
-def _backward_lobe(geometry: Geometry) -> FloatArray:
-    """max(0, cos(dphi)) sin(alpha) tan(beta) of (36)."""
-    alpha, beta = _larger_and_smaller(geometry)
-    return np.asarray(np.maximum(0.0, geometry.cos_dphi) * np.sin(alpha) * np.tan(beta))
-
-
-@kept
-def _second_bounce(geometry: Geometry) -> FloatArray:
-    """1 - cos(dphi) (2 beta/pi)^2 of (34)."""
-    _, beta = _larger_and_smaller(geometry)
-    return np.asarray(1 - geometry.cos_dphi * np.square(beta * (2 / np.pi)))
-
-
-def _saturation_gradient(sigma: float, constant: float) -> float:
-    """Derivative of sigma^2 / (sigma^2 + constant), sigma in radians, per degree."""
-    return math.radians(2 * sigma * constant / (sigma * sigma + constant) ** 2)
-
-
-def _larger_and_smaller(geometry: Geometry) -> tuple[FloatArray, FloatArray]:
-    """The paper's alpha = max(theta_r, theta_i) and beta = min(theta_r, theta_i), in radians."""
-    theta_i, theta_r = geometry.theta_i, geometry.theta_r
-    return np.maximum(theta_i, theta_r), np.minimum(theta_i, theta_r)
-
-
-LAMBERT = Model("lambert", (ALBEDO,), lambert_brdf, lambert_gradient)
 OREN_NAYAR_QUALITATIVE = Model(
     "oren_nayar_qualitative",
     (ALBEDO, SIGMA_DEG),
     oren_nayar_qualitative_brdf,
     oren_nayar_qualitative_gradient,
-    oren_nayar_qualitative_holds,
+    oren_nayar_qualitative_validity,
 )
 OREN_NAYAR = Model(
-    "oren_nayar", (ALBEDO, SIGMA_DEG), oren_nayar_brdf, oren_nayar_gradient, oren_nayar_holds
+    "oren_nayar", (ALBEDO, SIGMA_DEG), oren_nayar_brdf, oren_nayar_gradient, oren_nayar_validity
 )

@@ -32,10 +32,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.models.base import Model, Validity
-from analysis.models.rough.oren_nayar import ALBEDO, SIGMA_DEG
+from analysis.models.lambert import ALBEDO
+from analysis.models.rough.oren_nayar_forms import SIGMA_DEG
 from analysis.models.rough.v_cavity import isotropic_single_slope
 from analysis.models.specular.torrance_sparrow import gaussian_normalisation, mean_square_slope
-from analysis.models.validity import both_graze, held
+from analysis.models.validity import both_graze, valid_except
 from instrument.geometry import FloatArray, Geometry
 
 
@@ -270,10 +271,10 @@ def _profiles(geometry: Geometry, rule: Rule) -> Iterator[tuple[slice, Profile]]
     larger, smaller = np.maximum(theta_i, theta_r), np.minimum(theta_i, theta_r)
     for start in range(0, larger.size, _BLOCK):
         block = slice(start, start + _BLOCK)
-        yield block, _KEPT.get(larger[block], smaller[block], dphi[block], rule)
+        yield block, _CACHE.get(larger[block], smaller[block], dphi[block], rule)
 
 
-class _Kept:
+class _ProfileCache:
     """Profiles by the bytes of their geometry, within CACHE_BYTES; safe between threads."""
 
     def __init__(self) -> None:
@@ -303,15 +304,15 @@ class _Kept:
             self._nbytes = 0
 
 
-_KEPT = _Kept()
-forget = _KEPT.clear
+_CACHE = _ProfileCache()
+clear_profile_cache = _CACHE.clear
 """Drop the kept profiles and free their memory."""
 
 
-def oren_nayar_exact_holds(geometry: Geometry, albedo: float, sigma_deg: float) -> Validity:
+def oren_nayar_exact_validity(geometry: Geometry, albedo: float, sigma_deg: float) -> Validity:
     """Everywhere but where lamp and camera both graze the surface: the integral has no limit."""
     grazing = both_graze(geometry) & (albedo > 0) & (sigma_deg > 0)
-    return held(geometry, (grazing, "lamp and camera both graze the surface: no limit"))
+    return valid_except(geometry, (grazing, "lamp and camera both graze the surface: no limit"))
 
 
 OREN_NAYAR_EXACT = Model(
@@ -319,6 +320,6 @@ OREN_NAYAR_EXACT = Model(
     (ALBEDO, SIGMA_DEG),
     oren_nayar_exact_brdf,
     oren_nayar_exact_gradient,
-    oren_nayar_exact_holds,
+    oren_nayar_exact_validity,
     in_blocks=False,
 )

@@ -1,1 +1,4 @@
-"""analysis/models/smooth."""
+"""Smooth dielectrics of Wolff, Nayar and Oren (1998): scattering below a Fresnel interface.
+
+Open `wolff` first; `chandrasekhar` holds its H-function, `fresnel` its interface.
+"""

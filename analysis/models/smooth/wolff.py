@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.models.base import Model, Parameter, Validity
-from analysis.models.rough.oren_nayar import (
-    ALBEDO,
+from analysis.models.lambert import ALBEDO
+from analysis.models.rough.oren_nayar_forms import (
     SIGMA_DEG,
     roughness_terms,
     sigma_terms_gradient,
@@ -35,7 +35,7 @@ from analysis.models.smooth.fresnel import (
     wolff_polynomial,
 )
 from analysis.models.tanh_rule import W, X
-from analysis.models.validity import GRAZING, NEGATIVE, both_graze, held
+from analysis.models.validity import GRAZING, NEGATIVE, both_graze, valid_except
 from instrument.geometry import FloatArray, Geometry
 
 SINGLE_SCATTERING_ALBEDO = Parameter(
@@ -129,10 +129,10 @@ def _growth_by_n(mu: FloatArray, K: FloatArray, rho: float, n: float) -> FloatAr
     return np.asarray(dlog_H[0] + dlog_H[1] + dK[1] / (1 - K) - 2 / n - d_mu / (mu[0] + mu[1]))
 
 
-def wolff_holds(geometry: Geometry, single_scattering_albedo: float, n: float) -> Validity:
+def wolff_validity(geometry: Geometry, single_scattering_albedo: float, n: float) -> Validity:
     """Everywhere, but for a bare half-space (n = 1) with lamp and camera both grazing."""
     scatters = single_scattering_albedo > 0
-    return held(geometry, (both_graze(geometry) & scatters & (n == 1), _NO_INTERFACE))
+    return valid_except(geometry, (both_graze(geometry) & scatters & (n == 1), _NO_INTERFACE))
 
 
 def ray_terms(
@@ -369,12 +369,12 @@ def wolff_oren_nayar_gradient(
     }
 
 
-def wolff_oren_nayar_holds(
+def wolff_oren_nayar_validity(
     geometry: Geometry, albedo: float, sigma_deg: float, n: float
 ) -> Validity:
     """Up to the end of the transition range, where the formula is neither negative nor endless."""
     del albedo  # where it holds does not depend on it
-    return held(
+    return valid_except(
         geometry,
         (sigma_deg > TRANSITION_DEG[1], _TOO_ROUGH),
         (wolff_oren_nayar_brdf(geometry, 1.0, sigma_deg, n) < 0, NEGATIVE),
@@ -392,11 +392,11 @@ def roughness_share(sigma_deg: float) -> float:
     return 0.45 * sigma2 / (sigma2 + 0.09) / (1 - 0.5 * sigma2 / (sigma2 + 0.33))
 
 
-WOLFF = Model("wolff", (SINGLE_SCATTERING_ALBEDO, N), wolff_brdf, wolff_gradient, wolff_holds)
+WOLFF = Model("wolff", (SINGLE_SCATTERING_ALBEDO, N), wolff_brdf, wolff_gradient, wolff_validity)
 WOLFF_OREN_NAYAR = Model(
     "wolff_oren_nayar",
     (ALBEDO, SIGMA_DEG, N),
     wolff_oren_nayar_brdf,
     wolff_oren_nayar_gradient,
-    wolff_oren_nayar_holds,
+    wolff_oren_nayar_validity,
 )

@@ -27,7 +27,7 @@ from analysis.models.specular.surface_statistics import (
     unshadowed_deg,
 )
 from analysis.models.specular.torrance_sparrow import off_mirror2
-from analysis.models.validity import either_grazes, held
+from analysis.models.validity import either_grazes, valid_except
 from instrument.geometry import FloatArray, Geometry
 
 SCALE = Parameter("scale", "1", 0.0, 10.0, 0.1, scale=True)
@@ -56,16 +56,16 @@ def lobe_brdf(
     surface with long waves reflect 1 - e^{-g} and e^{-g} of the light, times `scale`. Diverges as
     1/cosθ at grazing, as printed.
     """
-    g, q = optical_roughness(geometry, sigma_h), _exponent(geometry, correlation_length)
-    return scale * _before_the_sum(geometry, correlation_length) * poisson_sum(g, q, _per_m)
+    g, q = optical_roughness(geometry, sigma_h), lobe_exponent(geometry, correlation_length)
+    return scale * lobe_factor(geometry, correlation_length) * poisson_sum(g, q, _per_m)
 
 
 def lobe_gradient(
     geometry: Geometry, scale: float, sigma_h: float, correlation_length: float
 ) -> dict[str, FloatArray]:
     """Derivatives of `lobe_brdf` by its parameters, in 1/sr per unit of each: sums over m again."""
-    g, q = optical_roughness(geometry, sigma_h), _exponent(geometry, correlation_length)
-    factor = _before_the_sum(geometry, correlation_length)
+    g, q = optical_roughness(geometry, sigma_h), lobe_exponent(geometry, correlation_length)
+    factor = lobe_factor(geometry, correlation_length)
     by_ln_g = poisson_sum(g, q, lambda m, g, _: (m - g) / m)
     by_ln_t2 = poisson_sum(g, q, lambda m, _, q: (1 - q / m) / m)
     per_sigma = scale * 2 / sigma_h if sigma_h > 1e-150 else 0.0  # f rises as sigma_h^2
@@ -88,7 +88,7 @@ def lobe_validity(
         "out; at grazing its 1/cosθ diverges"
     )
     curved = "the surface's radius of curvature is below a wavelength (Kirchhoff)"
-    return held(
+    return valid_except(
         geometry,
         ((larger_deg > limit_deg) | either_grazes(geometry), shadowed),
         (curvature_radius(sigma_h, correlation_length) < 1, curved),
@@ -99,9 +99,9 @@ def smooth_lobe_brdf(
     geometry: Geometry, scale: float, sigma_h: float, correlation_length: float
 ) -> FloatArray:
     """The lobe in 1/sr for g ≪ 1: 1991, (78) over (80), the first term of the sum."""
-    g, q = optical_roughness(geometry, sigma_h), _exponent(geometry, correlation_length)
+    g, q = optical_roughness(geometry, sigma_h), lobe_exponent(geometry, correlation_length)
     with np.errstate(under="ignore"):
-        return scale * _before_the_sum(geometry, correlation_length) * g * np.exp(-g - q)
+        return scale * lobe_factor(geometry, correlation_length) * g * np.exp(-g - q)
 
 
 def rough_lobe_brdf(
@@ -114,9 +114,9 @@ def rough_lobe_brdf(
     """
     if sigma_h < 1e-100:  # its square is 1/0
         raise ValueError(f"sigma_h = {sigma_h:g} wavelengths; allowed: 1e-100 or more where g ≫ 1")
-    g, q = optical_roughness(geometry, sigma_h), _exponent(geometry, correlation_length)
+    g, q = optical_roughness(geometry, sigma_h), lobe_exponent(geometry, correlation_length)
     with np.errstate(under="ignore"):
-        return scale * _before_the_sum(geometry, correlation_length) * np.exp(-q / g) / g
+        return scale * lobe_factor(geometry, correlation_length) * np.exp(-q / g) / g
 
 
 def spike_brdf(
@@ -163,13 +163,13 @@ def geometric_factor(geometry: Geometry) -> FloatArray:
     return np.asarray((off_mirror2(geometry) + along * along) / (2 * cos_i * along))
 
 
-def _exponent(geometry: Geometry, correlation_length: float) -> FloatArray:
+def lobe_exponent(geometry: Geometry, correlation_length: float) -> FloatArray:
     """q = v_xy² T²/4, so that a term of the sum has e^{-q/m}."""
     check_lengths(0.0, correlation_length)
     return (K * correlation_length) ** 2 / 4 * off_mirror2(geometry)
 
 
-def _before_the_sum(geometry: Geometry, correlation_length: float) -> FloatArray:
+def lobe_factor(geometry: Geometry, correlation_length: float) -> FloatArray:
     """(cosθ_i/cosθ_r) π T² D² in 1/sr."""
     ratio = np.cos(geometry.theta_i) / np.cos(geometry.theta_r)
     D = geometric_factor(geometry)

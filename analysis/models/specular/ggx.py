@@ -18,9 +18,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity, kept
+from analysis.models.base import Model, Parameter, Validity, cached_per_geometry
 from analysis.models.specular.torrance_sparrow import off_mirror2
-from analysis.models.validity import GRAZING, both_graze, held
+from analysis.models.validity import GRAZING, both_graze, valid_except
 from instrument.geometry import FloatArray, Geometry
 
 F0 = Parameter("f0", "1", 0.0, 1.0, 0.04, scale=True)
@@ -87,20 +87,20 @@ def ggx_f90_gradient(
     }
 
 
-def ggx_f90_holds(geometry: Geometry, f0: float, f90: float, alpha: float) -> Validity:
+def ggx_f90_validity(geometry: Geometry, f0: float, f90: float, alpha: float) -> Validity:
     """Where facets reflect no more than they receive, and not where both directions graze."""
     del alpha  # the limits are the geometry's and those of the strengths
-    return held(
+    return valid_except(
         geometry,
         (both_graze(geometry), GRAZING),
         (max(f0, f90) > 1, "a strength above 1: facets would reflect more than they receive"),
     )
 
 
-def ggx_holds(geometry: Geometry, f0: float, alpha: float) -> Validity:
+def ggx_validity(geometry: Geometry, f0: float, alpha: float) -> Validity:
     """Everywhere but where lamp and camera both graze the surface."""
     del f0, alpha  # the limit is the geometry's
-    return held(geometry, (both_graze(geometry), GRAZING))
+    return valid_except(geometry, (both_graze(geometry), GRAZING))
 
 
 def _factors(
@@ -114,7 +114,7 @@ def _factors(
     return cos2_a, cos_half, D, 0.5 / (c_i * q_r + c_r * q_i)
 
 
-@kept
+@cached_per_geometry
 def _half_vector(geometry: Geometry) -> tuple[FloatArray, ...]:
     """cos^2(theta_a), sin^2(theta_a) and cos(theta')."""
     across2 = off_mirror2(geometry)
@@ -128,5 +128,5 @@ def _q(theta: FloatArray, alpha: float) -> FloatArray:
     return np.asarray(np.sqrt(np.square(np.cos(theta)) + np.square(alpha * np.sin(theta))))
 
 
-GGX = Model("ggx", (F0, ALPHA), ggx_brdf, ggx_gradient, ggx_holds)
-GGX_F90 = Model("ggx_f90", (F0, F90, ALPHA), ggx_f90_brdf, ggx_f90_gradient, ggx_f90_holds)
+GGX = Model("ggx", (F0, ALPHA), ggx_brdf, ggx_gradient, ggx_validity)
+GGX_F90 = Model("ggx_f90", (F0, F90, ALPHA), ggx_f90_brdf, ggx_f90_gradient, ggx_f90_validity)

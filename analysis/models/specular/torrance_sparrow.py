@@ -20,8 +20,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity, kept
-from analysis.models.validity import GRAZING, both_graze, held
+from analysis.models.base import Model, Parameter, Validity, cached_per_geometry
+from analysis.models.validity import GRAZING, both_graze, valid_except
 from instrument.geometry import FloatArray, Geometry
 
 KS = Parameter("ks", "1", 0.0, 10.0, 0.1, scale=True)
@@ -79,7 +79,7 @@ def torrance_sparrow_lobe_gradient(
 
 def torrance_sparrow_validity(geometry: Geometry, **_: float) -> Validity:
     """Everywhere but where lamp and camera both graze: P / cos is without limit there."""
-    return held(geometry, (both_graze(geometry), GRAZING))
+    return valid_except(geometry, (both_graze(geometry), GRAZING))
 
 
 def torrance_sparrow_full(
@@ -122,7 +122,7 @@ def local_incidence(geometry: Geometry) -> FloatArray:
     return theta
 
 
-@kept
+@cached_per_geometry
 def _denominator(geometry: Geometry) -> FloatArray:
     """4 cos_i cos_r cos_a / G in one step: a grazing direction then needs no 0/0."""
     _, cos_a, cos_half = half_vector(geometry)
@@ -130,7 +130,7 @@ def _denominator(geometry: Geometry) -> FloatArray:
     return np.maximum(4 * cos_i * cos_r * cos_a, 2 * cos_half * np.maximum(cos_i, cos_r))
 
 
-@kept
+@cached_per_geometry
 def half_vector(geometry: Geometry) -> tuple[FloatArray, ...]:
     """theta_a in radians, cos(theta_a) and cos(theta') of the half-vector.
 
@@ -143,7 +143,7 @@ def half_vector(geometry: Geometry) -> tuple[FloatArray, ...]:
     return np.arctan2(np.sqrt(across2), along), along / length, length / 2
 
 
-@kept
+@cached_per_geometry
 def off_mirror2(geometry: Geometry) -> FloatArray:
     """Square of the part along the surface of the unit vectors to lamp and camera, summed.
 

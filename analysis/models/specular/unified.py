@@ -14,7 +14,7 @@ import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity
 from analysis.models.specular.torrance_sparrow import SIGMA_DEG, half_vector, off_mirror2
-from analysis.models.validity import either_grazes, held
+from analysis.models.validity import either_grazes, valid_except
 from instrument.geometry import FloatArray, Geometry
 
 DIFFUSE = Parameter("diffuse", "1", 0.0, 1.0, 0.5, scale=True)
@@ -74,7 +74,7 @@ def unified_gradient(
 def unified_validity(geometry: Geometry, **_: float) -> Validity:
     """Up to where lamp or camera grazes: 1/cosθ has no limit there."""
     reason = "lamp or camera grazes the surface: the printed 1/cosθ, without attenuation, diverges"
-    return held(geometry, (either_grazes(geometry), reason))
+    return valid_except(geometry, (either_grazes(geometry), reason))
 
 
 def moving_sensor(

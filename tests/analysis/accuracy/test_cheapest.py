@@ -8,13 +8,14 @@ from itertools import product
 import numpy as np
 import pytest
 
-from analysis.accuracy.cheapest import CHECKS, PHYSICS, Adequate, cheapest
-from analysis.accuracy.method import Method, Physics, Ranges
-from analysis.models.rough.form_error import LIMIT_DEG
-from analysis.models.rough.oren_nayar_exact import FINE, forget, oren_nayar_exact_brdf
+from analysis.accuracy.cheapest import CHECKS, FAMILIES, Adequate, cheapest
+from analysis.accuracy.method import Method, MethodFamily
+from analysis.models.base import Ranges
+from analysis.models.rough.form_error_table import LIMIT_DEG
+from analysis.models.rough.oren_nayar_exact import FINE, clear_profile_cache, oren_nayar_exact_brdf
 from instrument.geometry import Geometry
-from tests.analysis.accuracy.test_method import angles, drawn_ranges, within
 from tests.support.cpu_time import cpu_seconds
+from tests.support.method_scenes import angles, drawn_ranges, within
 
 Random = np.random.Generator
 
@@ -23,7 +24,7 @@ POINT = {"albedo": (0.8, 0.8), "sigma_deg": (20.0, 20.0)}
 DEARER = 1.2
 
 
-def scene(random: Random, physics: Physics) -> tuple[Geometry, Ranges, float, int]:
+def scene(random: Random, family: MethodFamily) -> tuple[Geometry, Ranges, float, int]:
     """Up to CHECKS geometries, ranges, a tolerance and the number of uses, all at random."""
     count = int(np.exp(random.uniform(0, np.log(CHECKS))))
     limit_deg = random.uniform(20, LIMIT_DEG)
@@ -31,14 +32,16 @@ def scene(random: Random, physics: Physics) -> tuple[Geometry, Ranges, float, in
     if random.random() < 0.3:
         theta_r = np.linspace(-limit_deg, limit_deg, count)
         geometry = Geometry.from_degrees(theta_i=random.uniform(0, limit_deg), theta_r=theta_r)
-    least = 1e-7 if physics.name == "rough" else 1e-6
+    least = 1e-7 if family.name == "rough" else 1e-6
     tolerance = float(np.exp(random.uniform(np.log(least), np.log(0.5))))
-    return geometry, drawn_ranges(random, physics), tolerance, int(random.choice([1, 10, 100]))
+    return geometry, drawn_ranges(random, family), tolerance, int(random.choice([1, 10, 100]))
 
 
-def off(physics: Physics, method: Method, geometry: Geometry, values: dict[str, float]) -> float:
-    exact = physics.reference.kernel(geometry, **values)
-    return float(np.max(np.abs(physics.off(method.kernel(geometry, **values), exact))))
+def off(
+    family: MethodFamily, method: Method, geometry: Geometry, values: dict[str, float]
+) -> float:
+    exact = family.reference.kernel(geometry, **values)
+    return float(np.max(np.abs(family.relative_error(method.kernel(geometry, **values), exact))))
 
 
 def steps(ranges: Ranges, count: int) -> Iterator[dict[str, float]]:
@@ -51,15 +54,15 @@ def steps(ranges: Ranges, count: int) -> Iterator[dict[str, float]]:
 
 
 def breaks(
-    physics: Physics, method: Method, geometry: Geometry, ranges: Ranges, tolerance: float
+    family: MethodFamily, method: Method, geometry: Geometry, ranges: Ranges, tolerance: float
 ) -> bool:
     """Whether a method is off by more than the tolerance anywhere in the ranges.
 
     As far as the reference can tell: a method is not given the benefit of the reference's error.
     """
-    tolerance -= 2 * float(np.max(physics.accuracy(geometry)))
+    tolerance -= 2 * float(np.max(family.accuracy(geometry)))
     count = 65 if sum(low < high for low, high in ranges.values()) == 1 else 33
-    if physics.name == "rough":  # the albedo counts by its ends, the highest sigma first
+    if family.name == "rough":  # the albedo counts by its ends, the highest sigma first
         albedos = sorted(set(ranges["albedo"]))
         sigmas = np.linspace(*reversed(ranges["sigma_deg"]), 129)
         tried: Iterator[dict[str, float]] = (
@@ -67,7 +70,7 @@ def breaks(
         )
     else:
         tried = steps({**ranges, **_top(ranges)}, count)
-    return any(off(physics, method, geometry, values) > tolerance for values in tried)
+    return any(off(family, method, geometry, values) > tolerance for values in tried)
 
 
 def _top(ranges: Ranges) -> Ranges:
@@ -80,40 +83,40 @@ def _top(ranges: Ranges) -> Ranges:
 def test_random_scenes_keep_the_tolerance_at_the_least_cost(
     name: str, share: float, slow: bool
 ) -> None:
-    """A thousand in the long form: everywhere within, and every method that is cheaper is not."""
-    physics, random = PHYSICS[name], np.random.default_rng(20)
+    """A thousand in the long form: everywhere within, and every method that is cheaper does not."""
+    family, random = FAMILIES[name], np.random.default_rng(20)
     for _ in range(round(share * (1000 if slow else 24))):
-        geometry, ranges, tolerance, uses = scene(random, physics)
+        geometry, ranges, tolerance, uses = scene(random, family)
         found = cheapest(name, geometry, ranges, tolerance, uses=uses)
         for _ in range(6):
             values = within(random, ranges)
-            assert off(physics, physics[found.method], geometry, values) <= tolerance, (
+            assert off(family, family[found.method], geometry, values) <= tolerance, (
                 found, ranges, values,
             )  # fmt: skip
         size = geometry.theta_i_deg.size
-        for method in physics.methods:
+        for method in family.methods:
             cost = method.cost(geometry, ranges).of(size, uses)
             if found.cost > DEARER * cost:
-                assert breaks(physics, method, geometry, ranges, tolerance), (
+                assert breaks(family, method, geometry, ranges, tolerance), (
                     found, method.name, tolerance, ranges,
                 )  # fmt: skip
-        forget()
+        clear_profile_cache()
 
 
 def test_larger_scenes_keep_the_tolerance_too() -> None:
     """There a doubt may be too large to check: nearly always the bounds settle it."""
-    physics, random, dearer = PHYSICS["rough"], np.random.default_rng(3), 0
+    family, random, dearer = FAMILIES["rough"], np.random.default_rng(3), 0
     for _ in range(3):
-        geometry, ranges = angles(random, 2 * CHECKS), drawn_ranges(random, physics)
+        geometry, ranges = angles(random, 2 * CHECKS), drawn_ranges(random, family)
         tolerance = float(np.exp(random.uniform(np.log(1e-4), np.log(0.3))))
         found = cheapest("rough", geometry, ranges, tolerance)
         values = within(random, ranges)
-        each = {m.name: off(physics, m, geometry, values) for m in physics.methods}
+        each = {m.name: off(family, m, geometry, values) for m in family.methods}
         assert each[found.method] <= tolerance
-        costs = [m.cost(geometry, ranges).of(2 * CHECKS) for m in physics.methods]
-        kept = [c for c, m in zip(costs, physics.methods, strict=True) if each[m.name] <= tolerance]
+        costs = [m.cost(geometry, ranges).of(2 * CHECKS) for m in family.methods]
+        kept = [c for c, m in zip(costs, family.methods, strict=True) if each[m.name] <= tolerance]
         dearer += found.cost > DEARER * min(kept)
-        forget()
+        clear_profile_cache()
     assert dearer <= 1
 
 
@@ -150,7 +153,7 @@ def test_a_tolerance_of_each_geometry_counts_for_itself() -> None:
     """Strict where the form is good, and lax where it is not: the form is adequate."""
     theta = np.array([10.0, 75.0])
     there = Geometry.from_degrees(theta_i=theta, theta_r=-theta)
-    form = PHYSICS["rough"]["functional"]
+    form = FAMILIES["rough"]["functional"]
     exact = oren_nayar_exact_brdf(there, 0.8, 20.0, FINE)
     near, far = np.abs(form.kernel(there, albedo=0.8, sigma_deg=20.0) / exact - 1)
     assert near < far / 3
@@ -170,37 +173,18 @@ def test_beyond_the_maps_it_checks() -> None:
     assert 0 < found.checked <= 0.3
 
 
-def test_a_narrow_lobe_is_followed_where_it_can_be_seen() -> None:
-    mirror = Geometry.from_degrees(theta_i=30.0, theta_r=np.linspace(-80, 80, 161))
-    very_rough = {"scale": (1.0, 1.0), "sigma_h": (20.0, 20.0), "correlation_length": (200.0,) * 2}
-    found = cheapest("lobe", mirror, very_rough, 0.01)
-    assert found.method == "rough"
-    smooth = {**very_rough, "sigma_h": (0.001, 0.001), "correlation_length": (3.0, 3.0)}
-    assert cheapest("lobe", mirror, smooth, 0.01).method == "smooth"
-    between = {**very_rough, "sigma_h": (5.0, 5.0), "correlation_length": (50.0, 50.0)}
-    assert cheapest("lobe", mirror, between, 1e-6).method == "adaptive"
-
-
-def test_a_smooth_body_takes_a_low_order_for_few_geometries_and_none_for_many() -> None:
-    """An order saves part of making a series, which of many geometries is no part to speak of."""
-    random = np.random.default_rng(1)
-    ranges = {"single_scattering_albedo": (0.5, 0.9), "n": (1.3, 1.7)}
-    few = cheapest("smooth", angles(random, 50, 70.0), ranges, 0.1)
-    assert few.method.startswith("order")
-    assert few.cost_of_best < 1.4 * few.cost
-    assert cheapest("smooth", angles(random, 50, 70.0), ranges, 1e-5).method == "exact"
-    many = cheapest("smooth", angles(random, 20_000, 70.0), ranges, 0.1)
-    assert many.cost_of_best < 1.05 * many.cost
-
-
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        (("smoth", POINT, 0.1), KeyError, "unknown physics 'smoth'; known: rough, smooth, lobe"),
+        (
+            ("smoth", POINT, 0.1),
+            KeyError,
+            "unknown family of methods 'smoth'; known: rough, smooth, lobe",
+        ),
         (("rough", {"albedo": (0.1, 0.2)}, 0.1), ValueError, "rough needs a range of sigma_deg: 0"),
         (("rough", {**POINT, "n": (1, 2)}, 0.1), ValueError, "rough has no parameter n; it has"),
         (("rough", {**POINT, "albedo": (0.2, 1.2)}, 0.1), ValueError, "albedo = 1.2; allowed: 0 t"),
-        (("rough", {**POINT, "albedo": (0.2, 0.1)}, 0.1), ValueError, "a range that rises"),
+        (("rough", {**POINT, "albedo": (0.2, 0.1)}, 0.1), ValueError, "allowed: low <= high"),
         (("rough", POINT, 1e-9), ValueError, "tolerance = 1e-09; the most accurate method, fine"),
         (("rough", POINT, float("nan")), ValueError, "tolerance = nan"),
     ],
@@ -226,11 +210,11 @@ def test_asking_costs_less_than_it_saves() -> None:
     anywhere = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=90.0)
 
     def ask() -> None:
-        forget()
+        clear_profile_cache()
         assert cheapest("rough", anywhere, POINT, 0.035).method == "functional"
 
     def integrate() -> None:
-        forget()
+        clear_profile_cache()
         oren_nayar_exact_brdf(anywhere, 0.8, 20.0)
 
     assert cpu_seconds(ask, 3) < 0.2 * cpu_seconds(integrate, 2)

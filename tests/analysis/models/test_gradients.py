@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from analysis.models import MODELS, Model
-from analysis.models.rough.oren_nayar import (
+from analysis.models.rough.oren_nayar import oren_nayar_qualitative_validity
+from analysis.models.rough.oren_nayar_forms import (
     oren_nayar_qualitative_brdf,
     oren_nayar_qualitative_gradient,
-    oren_nayar_qualitative_holds,
 )
 from instrument.geometry import Geometry
 
@@ -50,7 +50,7 @@ def test_the_gradient_is_that_of_central_differences(name: str, part: float) -> 
     model, geometry = MODELS[name], scattered(60)
     values = at(model, part)
     found = model.gradient(geometry, **values)
-    expected = replace(model, slopes=None).gradient(geometry, **values)
+    expected = replace(model, gradient_kernel=None).gradient(geometry, **values)
     assert list(found) == [p.name for p in model.parameters]
     for key, slope in found.items():
         assert slope.shape == geometry.shape
@@ -164,7 +164,7 @@ def test_footnote_11_s_constant() -> None:
     up, down = (oren_nayar_qualitative_brdf(geometry, 0.9, 30 + d, 0.57) for d in (step, -step))
     slopes = oren_nayar_qualitative_gradient(geometry, 0.9, 30.0, constant=0.57)
     np.testing.assert_allclose(slopes["sigma_deg"], (up - down) / (2 * step), rtol=1e-6, atol=1e-10)
-    assert oren_nayar_qualitative_holds(geometry, 0.9, 5.0, constant=0.57).mask.any()
+    assert oren_nayar_qualitative_validity(geometry, 0.9, 5.0, constant=0.57).mask.any()
 
 
 def test_where_the_functional_model_ends() -> None:

@@ -235,7 +235,7 @@ def test_parameters_that_cannot_be_shared() -> None:
 
 @pytest.mark.parametrize("name", ["phong", "lambert+phong", "lambert+lambert", ""])
 def test_unknown_names_list_the_known(name: str) -> None:
-    with pytest.raises(KeyError, match=r"oren_nayar_qualitative|names each model once"):
+    with pytest.raises(KeyError, match=r"oren_nayar_qualitative|each model once in a sum"):
         MODELS[name]
     assert name not in MODELS
 

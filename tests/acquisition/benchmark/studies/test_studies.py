@@ -53,8 +53,8 @@ from acquisition.engine.engine import Engine
 from acquisition.plan.plan import make_plan
 from acquisition.rig import open_devices
 from analysis.models import MODELS
-from analysis.models.rough.form_error import ERROR as TABLE_ERROR
-from analysis.models.rough.oren_nayar_exact import forget, oren_nayar_exact_brdf
+from analysis.models.rough.form_error_table import ERROR as TABLE_ERROR
+from analysis.models.rough.oren_nayar_exact import clear_profile_cache, oren_nayar_exact_brdf
 from instrument.config.load import load_protocol
 from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
@@ -113,7 +113,7 @@ def test_what_the_exact_rough_surface_costs() -> None:
             oren_nayar_exact_brdf(Geometry(*angles), 0.8, next(sigmas))
 
     def first() -> None:
-        forget()
+        clear_profile_cache()
         oren_nayar_exact_brdf(Geometry(*angles), 0.8, 20.0)
 
     assert 100 * in_turns(first, functional, 4) < 4000

@@ -16,7 +16,7 @@ from analysis.models.rough.oren_nayar_exact import (
     FINE,
     RULE,
     Rule,
-    forget,
+    clear_profile_cache,
     oren_nayar_exact_brdf,
     slope_kinks,
 )
@@ -90,7 +90,7 @@ def test_the_rules_keep_what_they_promise(rule: Rule, accuracy: float) -> None:
             best = oren_nayar_exact_brdf(geometry, 1.0, sigma, Rule(30, 18, 48))
             got = oren_nayar_exact_brdf(geometry, 1.0, sigma, rule)
             np.testing.assert_allclose(got, best, rtol=accuracy)
-    forget()
+    clear_profile_cache()
 
 
 def test_the_functional_and_qualitative_forms_are_off_as_the_errata_say() -> None:

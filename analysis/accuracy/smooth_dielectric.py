@@ -1,9 +1,9 @@
-"""Methods for Wolff's smooth dielectric: coarser Fresnel, and Chandrasekhar's H of finite order.
+"""Methods for Wolff's smooth dielectric: polynomial Fresnel, and Chandrasekhar's H of finite order.
 
 They save little. The exact H and K are two short series in one variable, made once for each pair of
 parameters: an order saves a fifth to two fifths of making them (0.35 ms in all), the polynomial a
-tenth, and either nothing in scenes of thousands of geometries (measured in turns: 0.6 to 0.86 of
-the time of 1 to 200 geometries, 0.9 to 1.05 from 2000 on). They stand for what they show, and for
+tenth, and neither saves anything in scenes of thousands of geometries (measured in turns: 0.6 to
+0.86 of the time of 1 to 200 geometries, 0.9 to 1.05 from 2000 on). They are here to compare with
 work that used them.
 """
 
@@ -13,14 +13,25 @@ from functools import partial
 
 import numpy as np
 
-from analysis.accuracy.failure_maps import ORDERS, RELATIVE, maps, smooth_grid
-from analysis.accuracy.method import Method, Physics, Ranges, cell_at, cells_of, constant, priced
+from analysis.accuracy.method import Method, MethodFamily, constant_bound, fixed_cost
+from analysis.models.base import Ranges
+from analysis.models.error_maps import RELATIVE, cell_at, cells_of, maps
 from analysis.models.smooth.fresnel import transmittance, wolff_polynomial
 from analysis.models.smooth.wolff import SINGLE_SCATTERING_ALBEDO, N, wolff_brdf
 from instrument.geometry import FloatArray, Geometry
 
 EPSILON = 0.07
 """Wolff's choice for most dielectrics: 1998, after (7)."""
+
+ORDERS = (1, 2, 3, 4, 6, 8, 12, 16)
+"""Orders of Chandrasekhar's H that have a map, in its order."""
+
+GRID: dict[str, FloatArray] = {
+    "n": np.array([1.0, 1.01, 1.03, 1.07, 1.15, 1.25, 1.4, 1.6, 1.8, 2.1, 2.5, 3.0]),
+    "root": np.linspace(0, 1, 13) ** 1.5,
+    "theta_deg": 90 * (1 - np.linspace(1, 0, 25) ** 1.5),
+}
+"""Edges of the map's cells: n, root = sqrt(1 - rho), and the angle of one ray."""
 
 _STEPS = 9  # of a range of n
 
@@ -33,15 +44,15 @@ def polynomial_bound(geometry: Geometry, ranges: Ranges) -> FloatArray:
     """
     low, high = ranges["n"]
     steps = np.linspace(low, high, 1 if low == high else _STEPS)
-    off = np.stack([_of_polynomial(geometry, float(n)) for n in steps])
-    most = np.abs(off)
+    errors = np.stack([_polynomial_error(geometry, float(n)) for n in steps])
+    most = np.abs(errors)
     if steps.size > 1:
-        bend = np.abs(np.diff(off, 2, axis=0)) / 4
+        bend = np.abs(np.diff(errors, 2, axis=0)) / 4
         most = most + np.concatenate([bend[:1], bend, bend[-1:]])
     return np.asarray(most.max(axis=0))
 
 
-def _of_polynomial(geometry: Geometry, n: float) -> FloatArray:
+def _polynomial_error(geometry: Geometry, n: float) -> FloatArray:
     ratio = np.ones(geometry.shape)
     for theta in (geometry.theta_i, geometry.theta_r):
         T = np.maximum(transmittance(theta, n), 1e-300)
@@ -50,43 +61,34 @@ def _of_polynomial(geometry: Geometry, n: float) -> FloatArray:
 
 
 def order_bound(order: int, geometry: Geometry, ranges: Ranges) -> FloatArray:
-    """Largest relative error with every H of one of `failure_maps.ORDERS`, (N,).
+    """Largest relative error with every H of one of the ORDERS, (N,).
 
     exp(lamp + camera) - 1, from the maps of the two rays.
     """
-    edges = smooth_grid()
     low, high = (float(np.sqrt(1 - rho)) for rho in reversed(ranges["single_scattering_albedo"]))
-    cells = (cells_of(edges["n"], *ranges["n"]), cells_of(edges["root"], low, high))
+    cells = (cells_of(GRID["n"], *ranges["n"]), cells_of(GRID["root"], low, high))
     total = np.zeros(geometry.shape)
     rays = (("smooth_lamp", geometry.theta_i_deg), ("smooth_camera", geometry.theta_r_deg))
     for name, theta_deg in rays:
         levels = maps()[name][ORDERS.index(order)][cells].max(axis=(0, 1))
-        total += RELATIVE.errors(levels)[cell_at(edges["theta_deg"], theta_deg)]
+        total += RELATIVE.errors(levels)[cell_at(GRID["theta_deg"], theta_deg)]
     return np.asarray(np.expm1(total))
 
 
 def _order(order: int) -> Method:
-    call = 3400 + 20 * order
-    return Method(
-        f"order {order}",
-        partial(wolff_brdf, order=order),
-        partial(order_bound, order),
-        priced(call, 4, call, 4),
-    )
+    kernel, bound = partial(wolff_brdf, order=order), partial(order_bound, order)
+    return Method(f"order {order}", kernel, bound, fixed_cost(3400 + 20 * order, 4))
 
 
-SMOOTH_BODY = Physics(
+_POLYNOMIAL = partial(wolff_brdf, epsilon=EPSILON)
+
+SMOOTH_DIELECTRIC = MethodFamily(
     "smooth",
     (SINGLE_SCATTERING_ALBEDO, N),
     (
-        Method(
-            "polynomial",
-            partial(wolff_brdf, epsilon=EPSILON),
-            polynomial_bound,
-            priced(4000, 4, 4000, 4),
-        ),
+        Method("polynomial", _POLYNOMIAL, polynomial_bound, fixed_cost(4000, 4)),
         *map(_order, ORDERS),
-        Method("exact", wolff_brdf, constant(1e-10), priced(4500, 4, 4500, 4)),
+        Method("exact", wolff_brdf, constant_bound(1e-10), fixed_cost(4500, 4)),
     ),
     lambda geometry: np.full(geometry.shape, 1e-10),
     {"single_scattering_albedo": "even", "n": "even"},
