@@ -72,7 +72,7 @@ class Bench(Closing):
     def __init__(self, loaded: Loaded, faults: Faults | None = None) -> None:
         from drivers.factory import Lines
 
-        self._faults = (faults or Faults.asked_for()) if loaded.rig.simulated else None
+        self._faults = (faults or Faults.from_environment()) if loaded.rig.simulated else None
         self._rig, self._closing = loaded.rig, ExitStack()
         self._scene = None if self._rig.real else _scene(loaded)
         self.clock: Clock = SimulatedClock() if self._rig.simulated else SystemClock()

@@ -1,1 +1,5 @@
-"""One simulated scene: its stage, camera, lamp and operator."""
+"""Simulation of a whole rig: `scene.scene` holds its state; start there.
+
+`scene` simulates the devices, `faults` makes them fail on request, `emulated` puts byte-level
+controllers and a V4L2 camera before the scene for the real drivers.
+"""

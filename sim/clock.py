@@ -1,4 +1,4 @@
-"""Simulated time: a sleep takes no time at all, yet the clock has moved on."""
+"""Simulated clock: a sleep returns at once and advances the time."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from datetime import UTC, datetime, timedelta
 
 
 class SimulatedClock:
-    """A clock that only moves when somebody sleeps."""
+    """Clock that advances only by `sleep`."""
 
     def __init__(self) -> None:
         self._start = datetime.now(UTC)
         self._elapsed_s = 0.0
 
     def now_s(self) -> float:
-        """Simulated seconds since the clock was made."""
+        """Return the simulated seconds since the clock was created."""
         return self._elapsed_s
 
     def utc(self) -> datetime:
-        """The start's date plus the simulated seconds."""
+        """Return the creation date plus the simulated seconds."""
         return self._start + timedelta(seconds=self._elapsed_s)
 
     def sleep(self, seconds: float) -> None:
-        """Move on by `seconds` at once."""
+        """Advance by `seconds` without waiting; negative values count as 0."""
         self._elapsed_s += max(0.0, seconds)

@@ -1,7 +1,7 @@
-"""Emulated devices over the simulated scene: what real drivers talk to where there is no bench.
+"""Emulated optical table: controllers and camera that the real drivers open, over one scene.
 
-Controllers answer in bytes on pseudo-terminals, the camera answers V4L2's own requests; all of them
-look at one scene, in real time.
+The controllers answer in bytes on pseudo-terminals and the camera answers V4L2 requests, all in
+real time.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from instrument.devices import Image, Surface
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.newport_controller import NewportController
 from sim.emulated.oriental_controller import OrientalController
-from sim.emulated.v4l2.device import Description, EmulatedCamera, Exposure
+from sim.emulated.v4l2.device import Capabilities, EmulatedCamera, Exposure
 from sim.emulated.v4l2.server import V4l2Server
-from sim.emulated.v4l2.shim import compiled, environment
+from sim.emulated.v4l2.shim import compile_shim, shim_environment
 from sim.emulated.wire import Controller, PtyWire
 from sim.emulated.zaber_controller import ZaberController
 from sim.scene.scene import Scene
@@ -36,22 +36,22 @@ from sim.scene.sensor import Sensor
 
 CAMERA_DEVICE = "/dev/v4l/by-id/emulated-gonio-camera"
 _SOCKET = "GONIO_V4L2_SOCKET"
-_FOLDER = "GONIO_V4L2_FOLDER"  # ours alone: removed when the program ends
-_BEYOND_DEG = 5.0  # the emulated controllers' own limits lie this far past the rig file's
+_FOLDER = "GONIO_V4L2_FOLDER"  # temporary folder, removed when the program ends
+_LIMIT_MARGIN_DEG = 5.0  # of the controllers' own limits beyond those in the rig file
 _FRAMES_PER_S = 400
 
 
 def restart_with_camera() -> None:
-    """Start the program again so that it sees the emulated camera, unless it does already.
+    """Restart the program with the emulated camera's library preloaded, unless it already is.
 
-    The loader takes the library that leads to the camera at the start of a process only.
+    The dynamic loader reads LD_PRELOAD only when a process starts.
     """
     if _SOCKET in os.environ:
         if _FOLDER in os.environ:
             atexit.register(shutil.rmtree, os.environ[_FOLDER], ignore_errors=True)
         return
     folder = Path(tempfile.mkdtemp(prefix="gonio-"))
-    added = environment(compiled(folder), CAMERA_DEVICE, folder / "camera")
+    added = shim_environment(compile_shim(folder), CAMERA_DEVICE, folder / "camera")
     added[_FOLDER] = str(folder)
     os.execve(
         sys.executable,
@@ -62,7 +62,7 @@ def restart_with_camera() -> None:
 
 @dataclass(frozen=True, slots=True)
 class _SceneSnapshot:
-    """What the scene looked like when an exposure began."""
+    """State of the scene at the start of an exposure."""
 
     surface: Surface
     lit: bool
@@ -72,7 +72,7 @@ class _SceneSnapshot:
 
 
 class EmulatedBench:
-    """The emulated devices over one scene, each plugged in when its driver is about to open it."""
+    """Emulated devices over one scene; each is connected just before its driver opens it."""
 
     def __init__(self, scene: Scene, clock: Clock) -> None:
         self._scene, self._clock = scene, clock
@@ -80,19 +80,19 @@ class EmulatedBench:
         self._closing = ExitStack()
 
     def close(self) -> None:
-        """Take all devices away."""
+        """Disconnect all devices."""
         self._closing.close()
 
     def plug_axis(self, name: str, axis: Wired) -> str:
-        """Put the axis's controller on a wire; returns the port that its driver opens."""
+        """Connect the controller of an axis; return the port for its driver."""
         low, high = axis.device_limits_deg()
         mechanics = Mechanics(
-            low - _BEYOND_DEG,
-            high + _BEYOND_DEG,
-            axis.speed_deg_per_s,
-            axis.acceleration_deg_per_s2,
-            axis.to_device_deg(axis.home_deg),
-            axis.homing_s / 2,
+            min_deg=low - _LIMIT_MARGIN_DEG,
+            max_deg=high + _LIMIT_MARGIN_DEG,
+            speed_deg_per_s=axis.speed_deg_per_s,
+            acceleration_deg_per_s2=axis.acceleration_deg_per_s2,
+            home_deg=axis.to_device_deg(axis.home_deg),
+            homing_s=axis.homing_s / 2,
         )
         motor = Motor(mechanics, self._clock)
         wire = self._closing.enter_context(PtyWire([_controller(axis, motor)]))
@@ -100,19 +100,19 @@ class EmulatedBench:
         return wire.port
 
     def plug_camera(self, camera: V4l2CameraConfig) -> str:
-        """Begin to answer as a camera; returns the device that its driver opens."""
-        painted = copy.copy(self._scene)  # its own state; the caches are shared
-        sensor, lock = Sensor(painted), threading.Lock()
+        """Connect the camera; return the device path for its driver."""
+        rendered = copy.copy(self._scene)  # separate state, shared caches
+        sensor, lock = Sensor(rendered), threading.Lock()
 
-        def render(exposure: Exposure, seen: object) -> Image:
+        def render(exposure: Exposure, snapshot: object) -> Image:
             with lock:
-                if isinstance(seen, _SceneSnapshot):
-                    painted.surface, painted.lit = seen.surface, seen.lit
-                    painted.begin_step(seen.step, seen.planned_s)
-                    painted.true_deg = dict(seen.true_deg)
+                if isinstance(snapshot, _SceneSnapshot):
+                    rendered.surface, rendered.lit = snapshot.surface, snapshot.lit
+                    rendered.begin_step(snapshot.step, snapshot.planned_s)
+                    rendered.true_deg = dict(snapshot.true_deg)
                 return sensor.picture(exposure.exposure_s)
 
-        device = EmulatedCamera(render, self._snapshot, _described(camera))
+        device = EmulatedCamera(render, self._snapshot, _capabilities(camera))
         self._closing.enter_context(V4l2Server(device, Path(os.environ[_SOCKET])))
         return CAMERA_DEVICE
 
@@ -136,8 +136,8 @@ def _controller(axis: Wired, motor: Motor) -> Controller:
             assert_never(axis)
 
 
-def _described(camera: V4l2CameraConfig) -> Description:
-    return Description(
+def _capabilities(camera: V4l2CameraConfig) -> Capabilities:
+    return Capabilities(
         formats=(camera.pixel_format,),
         sizes=((camera.width_px, camera.height_px),),
         frames_per_s=_FRAMES_PER_S,

@@ -1,49 +1,50 @@
-"""A Modbus TCP gateway before emulated drives: their requests, under another header."""
+"""Emulated Modbus TCP gateway: unwraps TCP frames for the drives behind it and wraps answers."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Protocol
 
-_HEADER = 7  # transaction, protocol (0), length, unit
-_MOST = 260  # the longest frame
-_NO_ANSWER = 0x0B  # the gateway's: the device behind it does not answer
+_HEADER = 7  # bytes: transaction (2), protocol = 0 (2), length (2), unit (1)
+_MAX_FRAME = 260  # bytes
+_TARGET_DID_NOT_RESPOND = 0x0B  # the gateway's exception code
 
 
-class Slave(Protocol):
-    """A device behind the gateway."""
+class ModbusDevice(Protocol):
+    """Device behind the gateway, by its unit address."""
 
     unit: int
 
     def serve(self, request: bytes) -> bytes:
-        """The answer to a request without its frame: function code and data."""
+        """Return the answer to a request; both are function code and data without a frame."""
         ...
 
 
 class ModbusTcpGateway:
-    """Serves several drives on one connection; requests may come in pieces."""
+    """Gateway that serves several devices on one connection; requests may arrive in pieces."""
 
-    def __init__(self, slaves: Sequence[Slave]) -> None:
-        self._slaves = {slave.unit: slave for slave in slaves}
-        self._waiting = b""
+    def __init__(self, devices: Sequence[ModbusDevice]) -> None:
+        self._devices = {device.unit: device for device in devices}
+        self._buffer = b""
 
     def answer(self, data: bytes) -> bytes:
-        """What it sends once these bytes have reached it."""
-        self._waiting += data
+        """Return the answers to all requests completed by these bytes."""
+        self._buffer += data
         out = b""
-        while len(self._waiting) >= _HEADER:
-            protocol, length = (int.from_bytes(self._waiting[i : i + 2], "big") for i in (2, 4))
-            if protocol or not 2 <= length <= _MOST - 6:
-                self._waiting = b""  # not Modbus: nothing after it can be trusted either
+        while len(self._buffer) >= _HEADER:
+            protocol, length = (int.from_bytes(self._buffer[i : i + 2], "big") for i in (2, 4))
+            if protocol or not 2 <= length <= _MAX_FRAME - 6:
+                self._buffer = b""  # not Modbus: frame boundaries are unknown from here on
                 break
-            if len(self._waiting) < 6 + length:
+            if len(self._buffer) < 6 + length:
                 break
-            frame, self._waiting = self._waiting[: 6 + length], self._waiting[6 + length :]
-            out += self._served(frame)
+            frame, self._buffer = self._buffer[: 6 + length], self._buffer[6 + length :]
+            out += self._serve(frame)
         return out
 
-    def _served(self, frame: bytes) -> bytes:
+    def _serve(self, frame: bytes) -> bytes:
         request = frame[_HEADER:]
-        slave = self._slaves.get(frame[6])
-        answer = slave.serve(request) if slave else bytes([0x80 | request[0], _NO_ANSWER])
+        device = self._devices.get(frame[6])
+        exception = bytes([0x80 | request[0], _TARGET_DID_NOT_RESPOND])
+        answer = device.serve(request) if device else exception
         return frame[:4] + (1 + len(answer)).to_bytes(2, "big") + frame[6:7] + answer

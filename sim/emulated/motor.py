@@ -1,4 +1,4 @@
-"""The mechanics behind an emulated controller: where the axis is, by kinematics and a clock."""
+"""Motion behind an emulated controller: the axis position from kinematics and a clock."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from instrument.clock import Clock
 from instrument.kinematics import Trapezoid
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Mechanics:
-    """What an axis can do, in the device's own degrees."""
+    """Limits, speed and homing of an axis, in device degrees."""
 
     min_deg: float = -180.0
     max_deg: float = 180.0
@@ -22,95 +22,98 @@ class Mechanics:
 
 
 class Motor:
-    """One axis. Safe from several threads: the controller drives it, the scene looks at it."""
+    """One axis, thread-safe: the controller drives it while the scene reads its position.
+
+    `alarm`: fault code as the controller reports it, "" for none; `homing_fails`: homing never
+    ends.
+    """
 
     def __init__(self, mechanics: Mechanics, clock: Clock) -> None:
         self.mechanics, self._clock = mechanics, clock
         self._lock = threading.RLock()
-        self._from_deg = mechanics.home_deg + 0.37  # wherever it was left
-        self._move = self._over(0.0)
-        self._started_s = clock.now_s()
+        self._start_deg = mechanics.home_deg + 0.37  # any position but home
+        self._move = self._trapezoid(0.0)
+        self._start_s = clock.now_s()
         self._homing_until_s: float | None = None
         self._held_deg: float | None = None
         self.referenced = False
         self.alarm = ""
-        self.refuses_home = False
+        self.homing_fails = False
 
     @property
     def position_deg(self) -> float:
-        """Where the axis is now."""
+        """Current position in degrees."""
         with self._lock:
             self._finish_homing()
             if self._held_deg is not None:
                 return self._held_deg
-            return self._from_deg + self._move.travelled_deg(self._clock.now_s() - self._started_s)
+            return self._start_deg + self._move.travelled_deg(self._clock.now_s() - self._start_s)
 
     @property
     def homing(self) -> bool:
-        """Whether it looks for its reference."""
+        """True while the axis searches for its reference."""
         with self._lock:
             self._finish_homing()
             return self._homing_until_s is not None
 
     @property
     def moving(self) -> bool:
-        """Whether its controller believes that it moves: a motor that is held never arrives."""
+        """True while the controller takes the axis to be moving; a held axis never arrives."""
         with self._lock:
             if self.homing:
                 return True
             held = self._held_deg is not None and self._move.distance_deg != 0
-            return held or self._clock.now_s() - self._started_s < self._move.duration_s
+            return held or self._clock.now_s() - self._start_s < self._move.duration_s
 
     def home(self) -> None:
-        """Begin to look for the reference."""
+        """Start searching for the reference."""
         with self._lock:
             self.stop()
             self.referenced = False
-            forever = float("inf")
-            takes_s = forever if self.refuses_home else self.mechanics.homing_s
-            self._homing_until_s = self._clock.now_s() + takes_s
+            duration_s = float("inf") if self.homing_fails else self.mechanics.homing_s
+            self._homing_until_s = self._clock.now_s() + duration_s
 
     def move(self, angle_deg: float) -> None:
-        """Begin to move."""
+        """Start a move."""
         with self._lock:
-            self._from_deg = self.position_deg
-            self._move = self._over(angle_deg - self._from_deg)
-            self._started_s = self._clock.now_s()
+            self._start_deg = self.position_deg
+            self._move = self._trapezoid(angle_deg - self._start_deg)
+            self._start_s = self._clock.now_s()
 
     def end_move(self) -> None:
-        """The move has just come to its end."""
+        """Complete the move at once."""
         with self._lock:
-            self._from_deg += self._move.distance_deg
-            self._move = self._over(0.0)
+            self._start_deg += self._move.distance_deg
+            self._move = self._trapezoid(0.0)
 
     def stop(self) -> None:
-        """Stand still where it is."""
+        """Stop at the current position."""
         with self._lock:
-            self._from_deg, self._homing_until_s = self.position_deg, None
-            self._move = self._over(0.0)
+            self._start_deg, self._homing_until_s = self.position_deg, None
+            self._move = self._trapezoid(0.0)
             self._held_deg = None
 
     def hold(self) -> None:
-        """Something holds the axis: it gets no further, and its controller does not notice."""
+        """Block the axis at its position, unnoticed by the controller."""
         with self._lock:
             at_deg = self.position_deg
-            if not self.moving:  # what has ended is no move that is held
-                self._from_deg, self._move = at_deg, self._over(0.0)
+            if not self.moving:  # a finished move cannot be held
+                self._start_deg, self._move = at_deg, self._trapezoid(0.0)
             self._held_deg = at_deg
 
     def push(self, by_deg: float) -> None:
-        """Something turns the axis away from where it stands; its encoder tells."""
+        """Turn the axis by an external force; its encoder shows it."""
         with self._lock:
-            self._from_deg += by_deg
+            self._start_deg += by_deg
 
     def lose_power(self) -> None:
-        """Its controller starts anew: it stands, and has no reference."""
+        """Restart the controller: the axis stops and has no reference."""
         with self._lock:
             self.stop()
             self.referenced = False
 
     def fail(self, alarm: str) -> None:
-        """The controller finds something wrong, named in its own code, and stops."""
+        """Stop with a fault, given as the controller's own code."""
         with self._lock:
             self.stop()
             self.alarm = alarm
@@ -119,9 +122,9 @@ class Motor:
         until_s = self._homing_until_s
         if until_s is not None and self._clock.now_s() >= until_s:
             self._homing_until_s = None
-            self._from_deg, self._move = self.mechanics.home_deg, self._over(0.0)
+            self._start_deg, self._move = self.mechanics.home_deg, self._trapezoid(0.0)
             self.referenced = True
 
-    def _over(self, distance_deg: float) -> Trapezoid:
+    def _trapezoid(self, distance_deg: float) -> Trapezoid:
         m = self.mechanics
         return Trapezoid(distance_deg, m.speed_deg_per_s, m.acceleration_deg_per_s2)

@@ -1,4 +1,4 @@
-"""An SMC100 as bytes: states, errors and answers as the maker's manual has them, over a motor."""
+"""Emulated Newport SMC100: states, error codes and answers as in the maker's manual."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ _ALL_AXES = ""
 
 
 class NewportController:
-    """One controller at an address. `motor.alarm` holds TS's four error digits."""
+    """One controller at an address. `motor.alarm` holds the four error digits of `TS`.
+
+    `moves`: number of moves started.
+    """
 
     def __init__(self, motor: Motor, address: int = 1, model: str = "SMC100") -> None:
         self.motor, self.address = motor, address
@@ -30,24 +33,26 @@ class NewportController:
         self.moves = 0
 
     def answer(self, data: bytes) -> bytes:
-        """Answers to the whole lines among what has come so far."""
+        """Return the answers to all lines completed by these bytes."""
         *lines, self._buffer = (self._buffer + data).split(b"\n")
-        return b"".join(self._line(line.strip().decode("ascii", "replace")) for line in lines)
+        return b"".join(
+            self._answer_line(line.strip().decode("ascii", "replace")) for line in lines
+        )
 
-    def _line(self, line: str) -> bytes:
+    def _answer_line(self, line: str) -> bytes:
         digits = line[: len(line) - len(line.lstrip("0123456789"))]
         letters, value = line[len(digits) : len(digits) + 2], line[len(digits) + 2 :]
         if digits not in (str(self.address), _ALL_AXES):
-            return b""  # another controller's
-        said = self._said(letters, value)
-        return b"" if said is None else f"{self.address}{letters}{said}\r\n".encode("ascii")
+            return b""  # addressed to another controller
+        answer = self._execute(letters, value)
+        return b"" if answer is None else f"{self.address}{letters}{answer}\r\n".encode("ascii")
 
-    def _said(self, letters: str, value: str) -> str | None:
-        """What a command makes it say; None for silence."""
+    def _execute(self, letters: str, value: str) -> str | None:
+        """Execute a command; return its answer, None for a command without one."""
         queries: dict[str, Callable[[], str]] = {
             "TS": lambda: self._errors() + self._state(),
             "TP": lambda: f"{self.motor.position_deg:.6f}",
-            "TE": self._told_error,
+            "TE": self._take_error,
             "VE": lambda: self._version,
             "ID": lambda: self._stage,
         }
@@ -97,7 +102,7 @@ class NewportController:
         self.values[letters] = number
         return "@"
 
-    def _told_error(self) -> str:
+    def _take_error(self) -> str:
         error, self._error = self._error, "@"
         return error
 

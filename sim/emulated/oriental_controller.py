@@ -1,7 +1,7 @@
-"""An Oriental Motor AZ drive as its line sees it: Modbus RTU bytes in, bytes out.
+"""Emulated Oriental Motor AZ drive: Modbus RTU requests in, answers out.
 
-Framing and registers are written here a second time, from the maker's manual and the Modbus
-specification, and share nothing with the driver's: one mistake cannot hide in both.
+Framing and registers are written a second time here, from the maker's manual and the Modbus
+specification, and share no code with the driver, so that an error in one is caught by the other.
 """
 
 from __future__ import annotations
@@ -11,24 +11,24 @@ from collections.abc import Callable
 
 from sim.emulated.motor import Motor
 
-GAP_S = 0.05  # what comes later than this after the last byte begins a new frame
-OVERLOAD_S = 5.0  # pushing for so long without getting on is an overload
+GAP_S = 0.05  # a longer pause between bytes starts a new frame
+OVERLOAD_S = 5.0  # a move without progress for so long is an overload
 
 _DIRECT, _INPUT, _OUTPUT, _ALARM = 0x58, 0x7C, 0x7E, 0x80
 _COMMAND_POSITION, _FEEDBACK_POSITION, _ALARM_RESET = 0xC6, 0xCC, 0x180
 _TRIGGER = _DIRECT + 15
 _SETTABLE = {*range(_DIRECT, _DIRECT + 16), _INPUT, _INPUT + 1, _ALARM_RESET, _ALARM_RESET + 1}
-_SHOWN = {_OUTPUT, _OUTPUT + 1, _ALARM, _ALARM + 1} | {
+_READABLE = {_OUTPUT, _OUTPUT + 1, _ALARM, _ALARM + 1} | {
     first + low for first in (_COMMAND_POSITION, _FEEDBACK_POSITION) for low in (0, 1)
 }
 _ZHOME, _STOP, _FREE, _ALM_RST = 4, 5, 6, 7
 _HOME_END, _READY, _ALM, _MOVE, _IN_POS = 4, 5, 7, 13, 14
 _KINDS = (1, 2, 3)  # absolute, incremental on the command, incremental on the feedback
-_NO_FUNCTION, _NO_ADDRESS, _NO_VALUE = 1, 2, 3
+_BAD_FUNCTION, _BAD_ADDRESS, _BAD_VALUE = 1, 2, 3
 
 
-class Refusal(Exception):
-    """An exception reply, by its code."""
+class ModbusException(Exception):
+    """Exception reply with its code."""
 
     def __init__(self, code: int) -> None:
         super().__init__(code)
@@ -36,9 +36,10 @@ class Refusal(Exception):
 
 
 class OrientalController:
-    """One drive. `triggers` counts the direct data operations that were started.
+    """One drive.
 
-    `now_s` tells the age of bytes and of an overload, in seconds.
+    `triggers`, `homings`: number of direct data operations and of homings started. `now_s`: clock
+    in seconds for the gaps between bytes and for overloads.
     """
 
     def __init__(
@@ -52,14 +53,17 @@ class OrientalController:
         self.triggers = self.homings = 0
         self._now_s = now_s
         self._set = dict.fromkeys(_SETTABLE, 0)
-        self._set[_DIRECT + 3], self._set[_DIRECT + 13] = 2, 1000  # type and current as delivered
+        self._set[_DIRECT + 3], self._set[_DIRECT + 13] = (
+            2,
+            1000,
+        )  # factory settings: operation type, current
         self._command_steps = self._feedback()
         self._frame, self._last_s = b"", now_s()
-        self._free = False
-        self._stuck_at_deg, self._stuck_since_s = motor.position_deg, now_s()
+        self._coasting = False
+        self._progress_deg, self._progress_s = motor.position_deg, now_s()
 
     def answer(self, data: bytes) -> bytes:
-        """What it sends on a serial line once these bytes have reached it."""
+        """Return the answers on a serial line to all requests completed by these bytes."""
         now_s = self._now_s()
         self._frame = data if now_s - self._last_s > GAP_S else self._frame + data
         self._last_s = now_s
@@ -67,32 +71,32 @@ class OrientalController:
         while (size := _size(self._frame)) and len(self._frame) >= size:
             frame, self._frame = self._frame[:size], self._frame[size:]
             if crc(frame[:-2]) != frame[-2:]:
-                self._frame = b""  # noise: deaf until the line has been quiet
+                self._frame = b""  # noise: discard until the next gap
                 break
-            out += self._framed(frame)
+            out += self._answer_frame(frame)
         return out
 
     def serve(self, request: bytes) -> bytes:
-        """The answer to a request without its frame: function code and data."""
+        """Return the answer to a request; both are function code and data without a frame."""
         function = request[0]
         try:
-            self._look()
-            return bytes([function]) + self._done(function, request[1:])
-        except Refusal as refusal:
-            return bytes([0x80 | function, refusal.code])
+            self._detect_overload()
+            return bytes([function]) + self._execute(function, request[1:])
+        except ModbusException as error:
+            return bytes([0x80 | function, error.code])
 
-    def _framed(self, frame: bytes) -> bytes:
+    def _answer_frame(self, frame: bytes) -> bytes:
         unit = frame[0]
         if unit not in (0, self.unit):
             return b""
         answer = frame[:1] + self.serve(frame[1:-2])
-        return answer + crc(answer) if unit else b""  # to all: no answer
+        return answer + crc(answer) if unit else b""  # broadcast: no answer
 
-    def _done(self, function: int, body: bytes) -> bytes:
+    def _execute(self, function: int, body: bytes) -> bytes:
         if function not in (3, 6, 16):
-            raise Refusal(_NO_FUNCTION)
+            raise ModbusException(_BAD_FUNCTION)
         if len(body) < 4:
-            raise Refusal(_NO_VALUE)
+            raise ModbusException(_BAD_VALUE)
         register, second = _word(body, 0), _word(body, 2)
         if function == 3:
             return self._read(register, second)
@@ -100,20 +104,20 @@ class OrientalController:
             self._write(register, [second])
             return body[:4]
         if not 1 <= second <= 123 or len(body) != 5 + 2 * second or body[4] != 2 * second:
-            raise Refusal(_NO_VALUE)
+            raise ModbusException(_BAD_VALUE)
         self._write(register, [_word(body, 5 + 2 * i) for i in range(second)])
         return body[:4]
 
     def _read(self, register: int, count: int) -> bytes:
         if not 1 <= count <= 125:
-            raise Refusal(_NO_VALUE)
+            raise ModbusException(_BAD_VALUE)
         wanted = range(register, register + count)
-        if not set(wanted) <= _SETTABLE | _SHOWN:
-            raise Refusal(_NO_ADDRESS)
-        values = self._set | self._shown()
+        if not set(wanted) <= _SETTABLE | _READABLE:
+            raise ModbusException(_BAD_ADDRESS)
+        values = self._set | self._status()
         return bytes([2 * count]) + b"".join(values[r].to_bytes(2, "big") for r in wanted)
 
-    def _shown(self) -> dict[int, int]:
+    def _status(self) -> dict[int, int]:
         alarm = int(self.motor.alarm, 16) if self.motor.alarm else 0
         return {
             **_pair(_OUTPUT, self._output()),
@@ -127,7 +131,7 @@ class OrientalController:
         moving, alarm = motor.moving, bool(motor.alarm)
         on = {
             _HOME_END: motor.referenced and not motor.homing,
-            _READY: not (moving or alarm or self._free or self._input(_STOP)),
+            _READY: not (moving or alarm or self._coasting or self._input(_STOP)),
             _ALM: alarm,
             _MOVE: moving,
             _IN_POS: not moving,
@@ -137,11 +141,11 @@ class OrientalController:
     def _write(self, register: int, values: list[int]) -> None:
         written = dict(zip(range(register, register + len(values)), values, strict=True))
         if not written.keys() <= _SETTABLE:
-            raise Refusal(_NO_ADDRESS)
+            raise ModbusException(_BAD_ADDRESS)
         before, after = self._set, self._set | written
         kind = _signed(after, _DIRECT + 2)
         if kind not in _KINDS or not 0 <= _signed(after, _DIRECT + 12) <= 1000:
-            raise Refusal(_NO_VALUE)
+            raise ModbusException(_BAD_VALUE)
         self._set = after
         self._act_on_inputs(before[_INPUT + 1], after[_INPUT + 1])
         if after[_ALARM_RESET + 1] and not before[_ALARM_RESET + 1]:
@@ -151,7 +155,7 @@ class OrientalController:
 
     def _act_on_inputs(self, before: int, after: int) -> None:
         edges = after & ~before
-        self._free = bool(after >> _FREE & 1)
+        self._coasting = bool(after >> _FREE & 1)
         if edges >> _ALM_RST & 1:
             self.motor.alarm = ""
         if (edges >> _STOP | edges >> _FREE) & 1:
@@ -166,20 +170,20 @@ class OrientalController:
         self.triggers += 1
         origin = {1: 0, 2: self._command_steps, 3: self._feedback()}[kind]
         steps = origin + _signed(self._set, _DIRECT + 4)
-        angle_deg, can = steps / self.steps_per_deg, self.motor.mechanics
-        if not can.min_deg <= angle_deg <= can.max_deg:
+        angle_deg, mechanics = steps / self.steps_per_deg, self.motor.mechanics
+        if not mechanics.min_deg <= angle_deg <= mechanics.max_deg:
             self.motor.fail("67")
             return
         self._command_steps = steps
-        self._stuck_at_deg, self._stuck_since_s = float("nan"), self._now_s()
+        self._progress_deg, self._progress_s = float("nan"), self._now_s()
         self.motor.move(angle_deg)
 
-    def _look(self) -> None:
-        """Find an overload: pushing for long without getting on."""
+    def _detect_overload(self) -> None:
+        """Raise the overload alarm if a move has made no progress for `OVERLOAD_S`."""
         at_deg, now_s = self.motor.position_deg, self._now_s()
-        if at_deg != self._stuck_at_deg or not self.motor.moving or self.motor.homing:
-            self._stuck_at_deg, self._stuck_since_s = at_deg, now_s
-        elif now_s - self._stuck_since_s > OVERLOAD_S:
+        if at_deg != self._progress_deg or not self.motor.moving or self.motor.homing:
+            self._progress_deg, self._progress_s = at_deg, now_s
+        elif now_s - self._progress_s > OVERLOAD_S:
             self.motor.fail("30")
 
     def _input(self, bit: int) -> bool:
@@ -190,7 +194,7 @@ class OrientalController:
 
 
 def crc(data: bytes) -> bytes:
-    """The two check bytes of Modbus RTU: polynomial A001 hex, from FFFF hex, low byte first."""
+    """Return the CRC-16 of Modbus RTU: polynomial A001 hex, start FFFF hex, low byte first."""
     value = 0xFFFF
     for byte in data:
         value ^= byte
@@ -200,14 +204,14 @@ def crc(data: bytes) -> bytes:
 
 
 def _size(frame: bytes) -> int:
-    """How long a request is, with its frame; 0 as long as that is not known."""
+    """Length of a request in bytes with its frame; 0 while it is unknown."""
     if len(frame) < 4:
         return 0
     if frame[1] == 16:
         return 9 + frame[6] if len(frame) > 6 else 0
     if frame[1] <= 6:
         return 8
-    return len(frame)  # a function that is not served: as it came
+    return len(frame)  # unsupported function: take all that has arrived
 
 
 def _word(data: bytes, at: int) -> int:

@@ -1,7 +1,7 @@
-"""What an emulated controller hangs on, a pseudo-terminal or a TCP port, and what goes wrong there.
+"""Pseudo-terminal or TCP port of an emulated controller, with faults injected into its answers.
 
-A controller turns the bytes that reach it into the bytes that it answers, by itself; a wire carries
-both, in a thread, and does to the answers what a test has asked for.
+A controller is a function from received bytes to answered bytes. A wire carries both in a thread of
+its own and applies the faults that a test has injected.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ FaultName = Literal["drop", "delay", "late", "garbage", "truncate", "nul", "lose
 
 
 class Controller(Protocol):
-    """A controller on a wire; several may share one."""
+    """Controller on a wire; several may share one."""
 
     def answer(self, data: bytes) -> bytes:
-        """What it sends once these bytes have reached it; commands may come in pieces."""
+        """Return the answer to the bytes just received; commands may arrive in pieces."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What happens to one answer: it is dropped, comes after `seconds`, is not what it should be.
+    """Fault of one answer: dropped, sent after `seconds`, or corrupted.
 
-    `delay` holds everything up, as a slow controller does; `late` lets later answers overtake
-    nothing either, but the master has given up by then. `lose request`: the controller never gets
-    the bytes. `unplug`: the port vanishes.
+    delay: the answer comes late but within the master's time-out. late: it comes after the master
+    has given up; later answers still queue behind it. lose request: the controller never receives
+    the command. unplug: the port disappears.
     """
 
     name: FaultName
@@ -46,7 +46,10 @@ class Fault:
 
 
 class _Wire(Closing):
-    """Feeds the controllers and spoils their answers. Subclasses carry the bytes."""
+    """Passes bytes to the controllers and their answers back; subclasses implement the port.
+
+    `seen`: time (monotonic, in s) and bytes of each message received from the master.
+    """
 
     def __init__(self, controllers: Sequence[Controller]) -> None:
         self._controllers = tuple(controllers)
@@ -58,23 +61,23 @@ class _Wire(Closing):
         self._thread.start()
 
     def inject(self, *faults: Fault | None) -> None:
-        """Spoil the next answers, one by one; None leaves one whole."""
+        """Apply these faults to the next answers, one each; None leaves an answer intact."""
         with self._lock:
             self._faults.extend(faults)
 
-    def heal(self) -> None:
-        """Spoil nothing any more."""
+    def clear_faults(self) -> None:
+        """Remove all faults not applied yet."""
         with self._lock:
             self._faults.clear()
 
     @property
     def pending(self) -> int:
-        """Faults that have not happened yet."""
+        """Number of faults not applied yet."""
         with self._lock:
             return len(self._faults)
 
     def close(self) -> None:
-        """Take the wire away."""
+        """Remove the port and end the thread."""
         self._closing.set()
         self._unplug()
         self._thread.join(timeout=5)
@@ -88,20 +91,20 @@ class _Wire(Closing):
     @abstractmethod
     def _unplug(self) -> None: ...
 
-    def _arrived(self, data: bytes) -> None:
-        """Pass on what the master sent, and answer."""
+    def _receive(self, data: bytes) -> None:
+        """Pass the master's bytes to the controllers and send their answer."""
         self.seen.append((time.monotonic(), data))
         with self._lock:
-            losing = bool(self._faults) and self._faults[0] == Fault("lose request")
-            if losing:
+            lost = bool(self._faults) and self._faults[0] == Fault("lose request")
+            if lost:
                 self._faults.popleft()
-        if losing:
+        if lost:
             return
         answer = b"".join(controller.answer(data) for controller in self._controllers)
         if answer:
-            self._spoiled(answer)
+            self._send_with_fault(answer)
 
-    def _spoiled(self, answer: bytes) -> None:
+    def _send_with_fault(self, answer: bytes) -> None:
         with self._lock:
             fault = self._faults.popleft() if self._faults else None
         if fault is None:
@@ -110,10 +113,10 @@ class _Wire(Closing):
             self._unplug()
         elif fault.name != "drop":
             self._closing.wait(fault.seconds)
-            self._send(_SPOILT.get(fault.name, bytes)(answer))
+            self._send(_CORRUPT.get(fault.name, bytes)(answer))
 
 
-_SPOILT: dict[str, Callable[[bytes], bytes]] = {
+_CORRUPT: dict[str, Callable[[bytes], bytes]] = {
     "garbage": lambda answer: bytes(0x80 | byte ^ 0x55 for byte in answer),
     "truncate": lambda answer: answer[: len(answer) // 2],
     "nul": lambda answer: b"\0\0" + answer[:3] + b"\0" + answer[3:],
@@ -121,20 +124,20 @@ _SPOILT: dict[str, Callable[[bytes], bytes]] = {
 
 
 class PtyWire(_Wire):
-    """A serial port: the master opens `port`."""
+    """Serial port on a pseudo-terminal; the master opens `port`."""
 
     def __init__(self, controllers: Sequence[Controller]) -> None:
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
         self.port = os.ttyname(self._slave)
-        self._open = threading.Lock()
+        self._descriptors = threading.Lock()
         super().__init__(controllers)
 
     def _serve(self) -> None:
         while not self._closing.is_set():
             try:
                 if select.select([self._master], [], [], 0.2)[0]:
-                    self._arrived(os.read(self._master, 4096))
+                    self._receive(os.read(self._master, 4096))
             except (OSError, ValueError):
                 return  # unplugged
 
@@ -145,7 +148,7 @@ class PtyWire(_Wire):
             return  # unplugged meanwhile
 
     def _unplug(self) -> None:
-        with self._open:
+        with self._descriptors:
             for descriptor in (self._master, self._slave):
                 if descriptor >= 0:
                     os.close(descriptor)
@@ -153,7 +156,7 @@ class PtyWire(_Wire):
 
 
 class TcpWire(_Wire):
-    """A gateway: the master connects to `host` and `port`."""
+    """TCP port of a gateway; the master connects to `host` and `port`."""
 
     host = "127.0.0.1"
 
@@ -167,18 +170,18 @@ class TcpWire(_Wire):
         while not self._closing.is_set():
             try:
                 self._peer, _ = self._listener.accept()
-                with self._peer as peer:  # one that hangs up is closed before the next
+                with self._peer as peer:  # closed before the next connection is accepted
                     while data := peer.recv(4096):
-                        self._arrived(data)
+                        self._receive(data)
             except OSError:
-                continue  # unplugged, or the master has gone
+                continue  # unplugged, or the master has disconnected
 
     def _send(self, data: bytes) -> None:
         if self._peer is not None:
             try:
                 self._peer.sendall(data)
             except OSError:
-                return  # the master has gone
+                return  # the master has disconnected
 
     def _unplug(self) -> None:
         for end in (self._peer, self._listener):

@@ -1,4 +1,4 @@
-"""A Zaber rotary stage as bytes: replies, checksums and warnings over a motor."""
+"""Emulated Zaber rotary stage (ASCII protocol): replies, checksums and warning flags."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ _COMMAND = re.compile(r"/(\d+)?(?: (\d+))?(?: (\d\d))?(?: ([a-z].*))?")
 
 
 class ZaberController:
-    """One device with one axis. `motor.alarm` holds a warning flag that begins with F."""
+    """One device with one axis. `motor.alarm` is a fault flag: it begins with F.
+
+    `moves`: number of moves started.
+    """
 
     def __init__(
         self, motor: Motor, device: int = 1, microsteps_per_deg: float = MICROSTEPS_PER_DEG
@@ -23,7 +26,7 @@ class ZaberController:
         low, high = motor.mechanics.min_deg, motor.mechanics.max_deg
         speed = motor.mechanics.speed_deg_per_s * self._per_deg * _SPEED_PER_MICROSTEP
         self.settings: dict[str, int | str] = {
-            "deviceid": 59999,  # no real device's
+            "deviceid": 59999,  # of no real device
             "system.serial": 75001,
             "system.axiscount": 1,
             "system.access": 1,
@@ -39,30 +42,30 @@ class ZaberController:
         }
 
     def answer(self, data: bytes) -> bytes:
-        """Replies to the whole lines among what has come so far."""
+        """Return the replies to all lines completed by these bytes."""
         *lines, self._buffer = (self._buffer + data).split(b"\n")
-        return b"".join(self._line(line.strip()) for line in lines)
+        return b"".join(self._answer_line(line.strip()) for line in lines)
 
-    def _line(self, line: bytes) -> bytes:
+    def _answer_line(self, line: bytes) -> bytes:
         text, colon, check = line.decode("ascii", "replace").partition(":")
         found = _COMMAND.fullmatch(text)
-        if found is None or (colon and int(check or "0", 16) != _check(text[1:])):
-            return b""  # a wrong checksum is not answered
+        if found is None or (colon and int(check or "0", 16) != _checksum(text[1:])):
+            return b""  # no reply to a wrong checksum
         device, axis, number, words = found.groups()
         if device not in (None, "0", "00", str(self.device), f"{self.device:02d}"):
             return b""
-        flag, data = self._said((words or "").strip())
+        flag, data = self._execute((words or "").strip())
         return self._reply(axis or "0", number, flag, data)
 
     def _reply(self, axis: str, number: str | None, flag: str, data: str) -> bytes:
-        """State as it is after the command: a move may have ended since its position was read."""
+        """Reply with the state after the command: a move may have ended during it."""
         status = "BUSY" if self.motor.moving else "IDLE"
         head = f"{self.device:02d} {axis}" + (f" {number}" if number else "")
         body = f"{head} {flag} {status} {(self._warnings() or ['--'])[0]} {data}"
-        return f"@{body}:{_check(body):02X}\r\n".encode("ascii")
+        return f"@{body}:{_checksum(body):02X}\r\n".encode("ascii")
 
-    def _said(self, words: str) -> tuple[str, str]:
-        """OK or RJ, and the reply's data."""
+    def _execute(self, words: str) -> tuple[str, str]:
+        """Execute a command; return OK or RJ, and the reply's data."""
         command, _, rest = words.partition(" ")
         if command == "":
             return "OK", "0"
@@ -117,5 +120,5 @@ class ZaberController:
         return flags if self.motor.referenced else [*flags, "WH"]
 
 
-def _check(body: str) -> int:
+def _checksum(body: str) -> int:
     return -sum(body.encode("ascii", "replace")) & 0xFF

@@ -1,1 +1,1 @@
-"""sim/faults."""
+"""Device faults in a simulated scan, planned in words: `GONIO_FAULTS`. Open `faults` first."""

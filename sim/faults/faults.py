@@ -1,10 +1,10 @@
-"""Faults of a simulated bench, planned in words: to try what a scan does when something fails.
+"""Faults planned in words for a simulated scan, to try out the program's response.
 
     GONIO_FAULTS="theta_r stalls at theta_r.wait 5" gonio run PROTOCOL
 
-plans one fault for this process (more are parted by `;`): a device, what happens to it, and the
-moment: at or after the how-manieth call of a device. `gonio resume` without it goes on with a sound
-bench.
+plans one fault for this process; `;` separates several. Each names a device, its fault, and the
+moment: at or after the n-th call of a device's method. `gonio resume` without the variable
+continues with sound devices.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from instrument.config.axes import AXES, SimulatedAxis
 from instrument.devices import Camera, Lamp, Operator, Stage
 from instrument.errors import InputError
 from sim.faults.faulty_devices import FaultyCamera, FaultyLamp, FaultyOperator, FaultyStage
-from sim.faults.triggers import Action, Moments, When
+from sim.faults.triggers import Action, Triggers, When
 from sim.scene.scene import Scene
 
 VARIABLE = "GONIO_FAULTS"
@@ -42,70 +42,72 @@ OPERATOR: Mapping[str, Callable[[FaultyOperator], None]] = {
     "refuses": FaultyOperator.refuse,
     "leaves": FaultyOperator.leave,
 }
-_KNOWN: Mapping[str, Mapping[str, object]] = {
+_BY_DEVICE: Mapping[str, Mapping[str, object]] = {
     **dict.fromkeys(AXES, STAGE), "camera": CAMERA, "lamp": LAMP, "operator": OPERATOR,
 }  # fmt: skip
 _FAULT = re.compile(r"(\w+) (.+) (at|after) (\w+\.\w+) ([1-9]\d*)")
-
 
 D = TypeVar("D")
 
 
 class Faults:
-    """What is to go wrong on one bench. `moments` counts its calls; `scene` is known once open."""
+    """Planned faults of one set of devices; wraps each device so that it can fail.
+
+    `triggers` counts the devices' calls; `scene` is set once the first stage has been wrapped.
+    """
 
     def __init__(self, text: str = "") -> None:
-        self.moments = Moments()
+        self.triggers = Triggers()
         self.scene: Scene | None = None
         self._devices: dict[str, object] = {}
-        for one in filter(None, (part.strip() for part in text.split(";"))):
-            self._plan_text(one)
+        for part in filter(None, map(str.strip, text.split(";"))):
+            self._plan_text(part)
 
     @classmethod
-    def asked_for(cls) -> Faults | None:
-        """Those of the environment, or None; `InputError` says what may be asked for."""
+    def from_environment(cls) -> Faults | None:
+        """Return the faults in `GONIO_FAULTS`, None if it is empty; raise `InputError` if wrong."""
         text = os.environ.get(VARIABLE, "").strip()
         return cls(text) if text else None
 
     def plan(self, device: str, fault: str, when: When, call: str, number: int) -> None:
-        """Let a fault of one of the tables above happen to a device, at that call."""
-        self.moments.plan(when, call, number, self._happening(device, fault))
+        """Plan a fault from the tables above for a device, at or after a call."""
+        self.triggers.plan(when, call, number, self._action(device, fault))
 
     def stage(self, name: str, stage: Stage, axis: SimulatedAxis, scene: Scene) -> Stage:
-        """A motor axis that can fail."""
+        """Wrap the stage of axis `name`."""
         self.scene = scene
-        return self._known(name, FaultyStage(name, stage, axis, scene, self.moments))
+        return self._register(name, FaultyStage(name, stage, axis, scene, self.triggers))
 
     def camera(self, camera: Camera) -> Camera:
-        """A camera that can fail."""
-        return self._known("camera", FaultyCamera(camera, self.moments))
+        """Wrap the camera."""
+        return self._register("camera", FaultyCamera(camera, self.triggers))
 
     def lamp(self, lamp: Lamp) -> Lamp:
-        """A shutter that can fail."""
-        return self._known("lamp", FaultyLamp(lamp, self.moments))
+        """Wrap the lamp's shutter."""
+        return self._register("lamp", FaultyLamp(lamp, self.triggers))
 
     def operator(self, operator: Operator) -> Operator:
-        """An operator who may refuse."""
-        return self._known("operator", FaultyOperator(operator, self.moments))
+        """Wrap the operator."""
+        return self._register("operator", FaultyOperator(operator, self.triggers))
 
-    def _known(self, name: str, device: D) -> D:
+    def _register(self, name: str, device: D) -> D:
         self._devices[name] = device
         return device
 
-    def _happening(self, device: str, fault: str) -> Action:
-        happen = cast("Callable[[object], None]", _KNOWN[device][fault])
+    def _action(self, device: str, fault: str) -> Action:
+        make_fail = cast("Callable[[object], None]", _BY_DEVICE[device][fault])
 
         def action() -> None:
             if device in self._devices:
-                happen(self._devices[device])
+                make_fail(self._devices[device])
 
         return action
 
     def _plan_text(self, text: str) -> None:
         found = _FAULT.fullmatch(text)
-        known = _KNOWN.get(found[1], {}) if found else {}
-        if found is None or found[2] not in known:
-            allowed = "; ".join(f"{name}: {', '.join(words)}" for name, words in _KNOWN.items())
+        faults = _BY_DEVICE.get(found[1], {}) if found else {}
+        if found is None or found[2] not in faults:
+            allowed = "; ".join(f"{name}: {', '.join(words)}" for name, words in _BY_DEVICE.items())
             raise InputError(
                 f"{VARIABLE}: {text!r}; allowed: DEVICE FAULT at|after DEVICE.CALL NUMBER, as in "
                 f"'theta_r stalls at theta_r.wait 5', with {allowed}"

@@ -1,4 +1,4 @@
-"""When something is to happen on a simulated bench: at or after a chosen call of a device."""
+"""Trigger points of planned faults: at or after the n-th call of a method of a device."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ When = Literal["at", "after"]
 Action = Callable[[], None]
 
 
-class Moments:
-    """Counts the calls of all devices, from 1 each, and lets happen what was planned.
+class Triggers:
+    """Counter of device calls that runs the actions planned for a certain call.
 
-    `calls` lists them in order as DEVICE.CALL.
+    Calls are named DEVICE.METHOD and counted from 1, each name by itself; `calls` lists them all in
+    order.
     """
 
     def __init__(self) -> None:
@@ -23,25 +24,25 @@ class Moments:
         self._planned: defaultdict[tuple[When, str, int], list[Action]] = defaultdict(list)
 
     def plan(self, when: When, call: str, number: int, action: Action) -> None:
-        """Let `action` happen before (at) or once (after) a call is made for that time."""
+        """Run `action` just before (at) or just after call number `number` of this name."""
         self._planned[when, call, number].append(action)
 
     @property
-    def left(self) -> int:
-        """What was planned and has not happened."""
+    def pending(self) -> int:
+        """Number of planned actions that have not run yet."""
         return sum(map(len, self._planned.values()))
 
     @contextmanager
-    def call(self, name: str, ready: Action = lambda: None) -> Iterator[None]:
-        """A device is called; `ready` raises where it cannot answer."""
+    def call(self, name: str, check: Action = lambda: None) -> Iterator[None]:
+        """Enclose one call of a device; `check` raises where the device cannot answer."""
         self.calls.append(name)
         self._counts[name] += 1
         number = self._counts[name]
-        self._happen("at", name, number)
-        ready()
+        self._run("at", name, number)
+        check()
         yield
-        self._happen("after", name, number)
+        self._run("after", name, number)
 
-    def _happen(self, when: When, name: str, number: int) -> None:
+    def _run(self, when: When, name: str, number: int) -> None:
         for action in self._planned.pop((when, name, number), ()):
             action()

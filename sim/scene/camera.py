@@ -1,4 +1,4 @@
-"""The simulated camera: takes the scene's picture in simulated time."""
+"""Simulated camera: renders the scene in simulated time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sim.scene.sensor import Sensor
 
 
 class SimulatedCamera:
-    """A camera that can do what the rig file says."""
+    """Camera with the properties given in the rig file."""
 
     def __init__(self, scene: Scene, clock: Clock) -> None:
         self._sensor, self._clock = Sensor(scene), clock
@@ -18,31 +18,31 @@ class SimulatedCamera:
         self._exposure_s = self._settings.min_exposure_s
 
     def identity(self) -> str:
-        """What this camera is."""
+        """Return a description with size and bit depth."""
         s = self._settings
         return f"simulated camera, {s.width_px} x {s.height_px} pixels, {s.bit_depth} bit"
 
     def settings(self) -> dict[str, str]:
-        """What it keeps to."""
+        """Return size in pixels and bit depth."""
         s = self._settings
         return {"size_px": f"{s.width_px} x {s.height_px}", "bit_depth": str(s.bit_depth)}
 
     def set_exposure_s(self, exposure_s: float) -> float:
-        """Set the exposure in seconds; outside the camera's range it is refused."""
+        """Set the exposure in seconds; raise `DeviceError` outside the camera's range."""
         low, high = self._settings.min_exposure_s, self._settings.max_exposure_s
         if not low <= exposure_s <= high:
             raise DeviceError(
-                f"camera: exposure {exposure_s:g} s asked for; it can do {low:g} to {high:g} s"
+                f"camera: exposure {exposure_s:g} s asked for; allowed: {low:g} to {high:g} s"
             )
         self._exposure_s = exposure_s
         return exposure_s
 
     def grab(self, count: int) -> list[Frame]:
-        """Take `count` frames one after the other in simulated time."""
+        """Take `count` frames, one after the other, in simulated time."""
         return [self._frame() for _ in range(count)]
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: there is nothing to release."""
 
     def _frame(self) -> Frame:
         self._clock.sleep(self._exposure_s + self._settings.frame_overhead_s)

@@ -1,4 +1,4 @@
-"""The scene in the operator's place, and its lamp."""
+"""Simulated operator and lamp shutter: both act on the scene in simulated time."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from sim.scene.scene import Scene
 
 
 class SimulatedOperator:
-    """Does at once, in simulated time, what the operator is asked to do."""
+    """Operator who carries out every request and takes the time the rig file gives for it."""
 
     def __init__(self, scene: Scene, clock: Clock) -> None:
         self._scene, self._clock = scene, clock
 
     def ask(self, request: Request) -> str:
-        """Act on the scene and answer as an operator would."""
+        """Change the scene as requested and return the operator's answer."""
         rig = self._scene.rig
         if request.action == "set axis":
             axis = rig.axes[request.axis]
@@ -31,21 +31,23 @@ class SimulatedOperator:
 
 
 class SimulatedShutter:
-    """A shutter before the simulated lamp."""
+    """Motorised shutter of the simulated lamp."""
 
     def __init__(self, scene: Scene, clock: Clock) -> None:
         self._scene, self._clock = scene, clock
 
     def identity(self) -> str:
-        """What this lamp is."""
+        """Return a description of the lamp."""
         return "simulated lamp with a shutter"
 
     def darken(self) -> None:
         """Close the shutter."""
-        self._clock.sleep(self._scene.rig.lamp.shutter_s)
-        self._scene.lit = False
+        self._move(lit=False)
 
     def light(self) -> None:
         """Open the shutter."""
+        self._move(lit=True)
+
+    def _move(self, lit: bool) -> None:
         self._clock.sleep(self._scene.rig.lamp.shutter_s)
-        self._scene.lit = True
+        self._scene.lit = lit

@@ -1,9 +1,9 @@
-"""The one scene: which surface stands there, where lamp and camera really are, how bright it is.
+"""State of the simulated rig: mounted surface, true angles, lamp level and random streams.
 
-The simulated stages write it, the simulated camera renders it, the simulated operator changes it
-when asked. Everything random is keyed by the rig's seed and by what it belongs to (an axis and an
-angle, a step of the plan and a frame), never by how often something was called, and the lamp ages
-by the plan's time: the same protocol gives the same bytes, in one go or resumed.
+Simulated stages and the simulated operator change it; the simulated camera renders it. Each random
+stream is keyed by the rig's seed and by what it belongs to (an axis and an angle; a step of the
+plan and a frame), never by the number of calls, and the lamp drifts with planned time. The same
+protocol therefore gives the same bytes, whether the scan ran in one go or was resumed.
 """
 
 from __future__ import annotations
@@ -22,14 +22,18 @@ from instrument.devices import Surface
 from instrument.geometry import Brdf, FloatArray, IntArray
 
 
-def key_of(text: str) -> int:
-    """A stable number for a word, to key a random stream with."""
-    return zlib.crc32(text.encode())
+def stream_key(name: str) -> int:
+    """Return a stable integer for `name`, to key a random stream with."""
+    return zlib.crc32(name.encode())
 
 
 @dataclass(slots=True)
 class Scene:
-    """State of the bench. Angles in degrees are the true ones, which differ from what was asked."""
+    """Mounted surface, lamp and axes at one moment of a scan.
+
+    true_deg: true angle of each axis in degrees; it differs from the commanded one by the axis
+    error. rings: see `sim.scene.render`; cache of the averaging needed for each place of the lamp.
+    """
 
     rig: Rig
     protocol: Protocol
@@ -43,28 +47,32 @@ class Scene:
     _texture: FloatArray | None = None
 
     def begin_step(self, step: int, planned_s: float) -> None:
-        """From now on the plan's step `step` is measured: its noise is its own.
+        """Select the noise of the plan's step `step` and the lamp's age `planned_s`.
 
-        planned_s: the time in the plan at which it is read; the lamp's age, whatever the clock is.
+        planned_s: planned time of the reading in seconds since the start of the scan.
         """
         self.step, self.planned_s = step, planned_s
 
     def random(self, *key: int) -> np.random.Generator:
-        """A stream of random numbers that belongs to `key` alone."""
+        """Return the random stream that belongs to `key` and the rig's seed."""
         return np.random.Generator(np.random.SFC64([self.rig.simulation.seed, *key]))
 
     def set_axis(self, axis: str, angle_deg: float) -> None:
-        """Put an axis at an angle of the rig; its true angle is off by the axis's u, repeatably.
+        """Set an axis to `angle_deg` (rig angle); the true angle differs by a random axis error.
 
-        A return to the same angle gives the same true angle, as a stage's cyclic error does.
+        The error has the axis's standard uncertainty and depends on the angle only, like the
+        cyclic error of a real stage: returning to an angle gives the same true angle.
         """
         u_deg = self.rig.axes[axis].u_deg
         key = round(angle_deg * 1e4) % 2**32
-        error_deg = u_deg * self.random(key_of(axis), key).standard_normal()
+        error_deg = u_deg * self.random(stream_key(axis), key).standard_normal()
         self.true_deg[axis] = float(angle_deg + error_deg)
 
     def brdf(self) -> Brdf:
-        """Reflectance of the surface that stands there, in 1/sr."""
+        """Return the BRDF of the mounted surface.
+
+        The function takes a `Geometry` of any shape and returns an array of that shape in 1/sr.
+        """
         if self.surface == "sample":
             if self.sample.method == "auto":
                 return adequate_brdf(self.sample.model, self.sample.parameters)
@@ -74,19 +82,22 @@ class Scene:
         return lambda geometry: MODELS["lambert"].brdf(geometry, albedo=albedo)
 
     def tile_reflectance(self) -> float:
-        """What the white tile really reflects: its certificate's value within its uncertainty."""
+        """Return the white tile's true reflectance: the certified one plus a random error."""
         tile = self.protocol.references.white_tile
         if tile is None:
-            raise ValueError("white tile asked for, but the protocol has none")
-        error = tile.u_reflectance * self.random(key_of("white tile")).standard_normal()
+            raise ValueError("white tile requested, but the protocol has none")
+        error = tile.u_reflectance * self.random(stream_key("white tile")).standard_normal()
         return float(min(1.0, tile.reflectance + error))
 
     def lamp_level(self) -> float:
-        """The lamp's output relative to the start of the scan."""
+        """Return the lamp's output relative to the start of the scan."""
         return 1.0 + self.rig.simulation.lamp_drift_per_hour * self.planned_s / 3600.0
 
     def mottling(self) -> tuple[FloatArray, float]:
-        """Relative albedo texture of the sample, mean 0, and its grid's spacing in mm."""
+        """Return the sample's relative albedo variation (rows, columns), mean 0, and its spacing.
+
+        The spacing of the grid points is in mm.
+        """
         size = self.protocol.sample
         spacing_mm = self.sample.mottling_size_mm / 3.0
         rows = int(np.ceil(size.height_mm / spacing_mm)) + 1
@@ -98,8 +109,8 @@ class Scene:
         return self._texture, spacing_mm
 
     def _make_texture(self, rows: int, columns: int) -> FloatArray:
-        """White noise, smoothed to patches of `mottling_size_mm` (three grid points)."""
-        white = self.random(key_of("mottling")).standard_normal((rows, columns))
+        """White noise smoothed to patches of `mottling_size_mm` (three grid points)."""
+        white = self.random(stream_key("mottling")).standard_normal((rows, columns))
         smooth = cv2.GaussianBlur(white, (0, 0), 1.5, borderType=cv2.BORDER_REFLECT)
         smooth -= smooth.mean()
         texture: FloatArray = smooth * (self.sample.mottling / smooth.std())

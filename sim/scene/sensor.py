@@ -1,4 +1,4 @@
-"""The sensor behind every picture of the scene: electrons, noise, full well, counts."""
+"""Image sensor: turns rendered electrons per second into counts, with noise and a full well."""
 
 from __future__ import annotations
 
@@ -8,66 +8,67 @@ import numpy as np
 from instrument.config.camera import CameraConfig
 from instrument.devices import Image
 from sim.scene.render import FloatImage, electrons_per_s
-from sim.scene.scene import Scene, key_of
+from sim.scene.scene import Scene, stream_key
 
-View = tuple[object, ...]  # what the picture depends on but for exposure and lamp level
+_SceneState = tuple[object, ...]  # surface and true angles: all that a rendered image depends on
 
 
 class Sensor:
-    """Turns the scene into counts, with noise that belongs to a frame and not to a call.
+    """Sensor that looks at one scene.
 
-    It is keyed by the plan's step (a dark's by that it is dark), the exposure, and the frame's
-    number since these were last changed: a step that is taken again is taken the same.
+    The noise belongs to a frame, not to a call. It is keyed by the plan's step (for a dark frame
+    only by its being dark), the exposure, and the frame's number since either last changed, so
+    that repeating a step gives the same frames.
 
-    Photon noise is drawn as normal with the mean's variance: from the few tens of electrons that
-    the read noise alone amounts to, the difference from Poisson is far below one count.
+    Photon noise is normal with the variance of the mean: above the few tens of electrons of the
+    read noise its difference from a Poisson distribution is far below one count.
     """
 
     def __init__(self, scene: Scene) -> None:
-        cv2.setNumThreads(1)  # so small a picture costs more to share out than to work on
+        cv2.setNumThreads(1)  # images are so small that several threads are slower than one
         self._scene = scene
         self._settings: CameraConfig = scene.rig.camera
         self._series: tuple[int, ...] = ()
-        self._number = 0
+        self._frame_number = 0
         shape = (self._settings.height_px, self._settings.width_px)
-        self._light_for: View = ()
-        self._light = self._black = np.zeros(shape, np.float32)
-        self._expected_for: tuple[View, float, float] = ((), 0.0, 0.0)
+        self._light_state: _SceneState = ()
+        self._light = self._no_light = np.zeros(shape, np.float32)
+        self._expected_key: tuple[_SceneState, float, float] = ((), 0.0, 0.0)
         self._expected = (self._light, self._light)
         self._noise = np.empty(shape, np.float32)
         self._counts = np.empty(shape, np.uint16)
 
     def picture(self, exposure_s: float) -> Image:
-        """Counts of the scene as it is.
+        """Return an image of the scene in its present state, (height, width) in counts.
 
-        The mean is kept while view, exposure and lamp (to 1e-6 of its level) are the same.
+        The expected counts are reused while scene, exposure and lamp level (to 1e-6) stay the same.
         """
         mean, spread = self._mean_and_spread_dn(exposure_s)
-        noise = self._normal(exposure_s)
+        noise = self._standard_normal(exposure_s)
         np.multiply(noise, spread, out=noise)
         cv2.add(noise, mean, dst=self._counts, dtype=cv2.CV_16U)  # rounds, and saturates at 0
         counts = np.minimum(self._counts, self._settings.max_dn)
         return counts.astype(np.uint8) if self._settings.bit_depth == 8 else counts
 
     def _mean_and_spread_dn(self, exposure_s: float) -> tuple[FloatImage, FloatImage]:
-        """Expected counts of every pixel and their standard deviation, before rounding."""
+        """Expected counts of each pixel and their standard deviation, before rounding."""
         scene = self._scene
         level = round(scene.lamp_level(), 6) if scene.lit else 0.0
-        view = (scene.surface, *sorted(scene.true_deg.items()))
-        key = (view, exposure_s, level)
-        if key != self._expected_for:
-            light = self._light_of(view) if scene.lit else self._black
-            self._expected = self._counts_of(light, level, exposure_s)
-            self._expected_for = key
+        state = (scene.surface, *sorted(scene.true_deg.items()))
+        key = (state, exposure_s, level)
+        if key != self._expected_key:
+            light = self._light_of(state) if scene.lit else self._no_light
+            self._expected = self._expected_dn(light, level, exposure_s)
+            self._expected_key = key
         return self._expected
 
-    def _light_of(self, view: View) -> FloatImage:
-        """Electrons per second at the lamp's full level."""
-        if view != self._light_for:
-            self._light, self._light_for = electrons_per_s(self._scene), view
+    def _light_of(self, state: _SceneState) -> FloatImage:
+        """Electrons per second at lamp level 1."""
+        if state != self._light_state:
+            self._light, self._light_state = electrons_per_s(self._scene), state
         return self._light
 
-    def _counts_of(
+    def _expected_dn(
         self, light: FloatImage, level: float, exposure_s: float
     ) -> tuple[FloatImage, FloatImage]:
         s = self._settings
@@ -81,14 +82,14 @@ class Sensor:
         electrons += np.float32(s.black_level_dn)
         return electrons, spread
 
-    def _normal(self, exposure_s: float) -> FloatImage:
-        """Standard normal noise. OpenCV's generator is four times as fast as NumPy's here."""
+    def _standard_normal(self, exposure_s: float) -> FloatImage:
+        """Standard normal noise; OpenCV's generator is four times as fast here as NumPy's."""
         scene = self._scene
-        of = (key_of("frame"), scene.step) if scene.lit else (key_of("dark"),)
-        series = (scene.rig.simulation.seed, *of, round(exposure_s * 1e9))
-        self._number = self._number + 1 if series == self._series else 0
+        step_key = (stream_key("frame"), scene.step) if scene.lit else (stream_key("dark"),)
+        series = (scene.rig.simulation.seed, *step_key, round(exposure_s * 1e9))
+        self._frame_number = self._frame_number + 1 if series == self._series else 0
         self._series = series
-        key = [*series, self._number]
+        key = [*series, self._frame_number]
         cv2.setRNGSeed(int(np.random.SeedSequence(key).generate_state(1)[0] >> 1))
         cv2.randn(self._noise, np.zeros(1), np.ones(1))
         return self._noise

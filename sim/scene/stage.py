@@ -1,4 +1,4 @@
-"""The simulated rotary stage: moves by its kinematics in simulated time and writes the scene."""
+"""Simulated rotary stage: trapezoidal motion in simulated time; writes its angle to the scene."""
 
 from __future__ import annotations
 
@@ -10,34 +10,33 @@ from sim.scene.scene import Scene
 
 
 class SimulatedStage:
-    """One motor axis. Angles are the device's own: it reads `zero_deg` where the axis reads 0."""
+    """One motorised axis, in device degrees: `zero_deg` is the reading at rig angle 0."""
 
     def __init__(self, name: str, axis: SimulatedAxis, scene: Scene, clock: Clock) -> None:
         self._name, self._axis, self._scene, self._clock = name, axis, scene, clock
         self._homed = False
-        self._position_deg = axis.zero_deg
-        self._move = Trapezoid(0.0, axis.speed_deg_per_s, axis.acceleration_deg_per_s2)
-        self._started_s = 0.0
+        self._start_deg = axis.zero_deg
+        self._move = self._trapezoid(0.0)
+        self._start_s = 0.0
 
     def identity(self) -> str:
-        """What this stage is."""
-        axis = self._axis
-        return f"simulated stage {self._name}, {axis.speed_deg_per_s:g} deg/s"
+        """Return a description with axis name and speed."""
+        return f"simulated stage {self._name}, {self._axis.speed_deg_per_s:g} deg/s"
 
     def home(self) -> None:
         """Find the reference."""
         self._clock.sleep(self._axis.homing_s)
         self._homed = True
-        self._position_deg = self._axis.to_device_deg(self._axis.home_deg)
-        self._move = self._over(0.0)
+        self._start_deg = self._axis.to_device_deg(self._axis.home_deg)
+        self._move = self._trapezoid(0.0)
         self._write_scene()
 
     def homed(self) -> bool:
-        """Whether it was homed since it was made."""
+        """Return True once `home` has been called."""
         return self._homed
 
     def settings(self) -> dict[str, str]:
-        """What it keeps to."""
+        """Return limits, speed and acceleration."""
         low, high = self.limits_deg()
         axis = self._axis
         return {
@@ -47,52 +46,48 @@ class SimulatedStage:
         }
 
     def start_move(self, angle_deg: float) -> None:
-        """Begin to move; refuses before homing and past the limits of the rig file."""
+        """Start a move; raise `DeviceError` if not homed or beyond the rig file's limits."""
         if not self._homed:
-            raise DeviceError(f"stage {self._name}: not homed, so it must not move: home it first")
+            raise DeviceError(f"stage {self._name}: not homed: home it before moving it")
         low, high = self.limits_deg()
         if not low - 1e-9 <= angle_deg <= high + 1e-9:
             raise DeviceError(
                 f"stage {self._name}: {angle_deg:g} deg asked for; its limits are {low:g} to "
-                f"{high:g} deg (the device's own degrees): nothing has moved"
+                f"{high:g} deg (in device degrees): nothing has moved"
             )
-        self._position_deg = self._now_deg()
-        self._move = self._over(angle_deg - self._position_deg)
-        self._started_s = self._clock.now_s()
+        self._start_deg = self.position_deg()
+        self._move = self._trapezoid(angle_deg - self._start_deg)
+        self._start_s = self._clock.now_s()
 
     def wait(self) -> float:
-        """Let the move end and return the position in degrees."""
-        left_s = self._started_s + self._move.duration_s - self._clock.now_s()
-        self._clock.sleep(left_s)
-        return self._arrive()
+        """Let the move finish and return the position in degrees."""
+        self._clock.sleep(self._start_s + self._move.duration_s - self._clock.now_s())
+        return self._halt()
 
     def position_deg(self) -> float:
-        """Where the stage is."""
-        return self._now_deg()
+        """Return the current position, also during a move."""
+        return self._start_deg + self._move.travelled_deg(self._clock.now_s() - self._start_s)
 
     def limits_deg(self) -> tuple[float, float]:
-        """The rig file's limits."""
+        """Return the rig file's limits in device degrees."""
         return self._axis.device_limits_deg()
 
     def stop(self) -> None:
-        """End the move where the axis is now."""
-        self._arrive()
+        """End the move at the current position."""
+        self._halt()
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: there is nothing to release."""
 
-    def _arrive(self) -> float:
-        self._position_deg = self._now_deg()
-        self._move = self._over(0.0)
+    def _halt(self) -> float:
+        self._start_deg = self.position_deg()
+        self._move = self._trapezoid(0.0)
         self._write_scene()
-        return self._position_deg
+        return self._start_deg
 
-    def _over(self, distance_deg: float) -> Trapezoid:
+    def _trapezoid(self, distance_deg: float) -> Trapezoid:
         axis = self._axis
         return Trapezoid(distance_deg, axis.speed_deg_per_s, axis.acceleration_deg_per_s2)
 
-    def _now_deg(self) -> float:
-        return self._position_deg + self._move.travelled_deg(self._clock.now_s() - self._started_s)
-
     def _write_scene(self) -> None:
-        self._scene.set_axis(self._name, self._axis.from_device_deg(self._position_deg))
+        self._scene.set_axis(self._name, self._axis.from_device_deg(self._start_deg))

@@ -17,16 +17,16 @@ from instrument.devices import Frame
 from instrument.errors import GonioError, OperatorStop, StorageError
 from instrument.record.reading import Preview, Reading
 from instrument.record.record import Record
-from sim.faults.triggers import Action, Moments, When
+from sim.faults.triggers import Action, Triggers, When
 from tests.support.scans import undated
 
-Moment = tuple[When, str, int]
+Trigger = tuple[When, str, int]
 
 
 class Watched(Record):
     """A record whose acceptance of a reading is a moment as well, and whose disk can fail."""
 
-    moments = Moments()
+    triggers = Triggers()
 
     def add_reading(
         self,
@@ -35,7 +35,7 @@ class Watched(Record):
         frames: Sequence[Frame] = (),
         files: Sequence[str] = (),
     ) -> None:
-        with self.moments.call("record.add_reading"):
+        with self.triggers.call("record.add_reading"):
             super().add_reading(reading, preview, frames, files)
 
     def refuse_writes(self) -> None:
@@ -51,14 +51,14 @@ class Watched(Record):
 class Watching:
     """Passes all calls on to a device, each of them a moment."""
 
-    def __init__(self, name: str, device: object, moments: Moments) -> None:
-        self._name, self._device, self._moments = name, device, moments
+    def __init__(self, name: str, device: object, triggers: Triggers) -> None:
+        self._name, self._device, self._triggers = name, device, triggers
 
     def __getattr__(self, name: str) -> object:
         found = getattr(self._device, name)
 
         def called(*arguments: object) -> object:
-            with self._moments.call(f"{self._name}.{name}"):
+            with self._triggers.call(f"{self._name}.{name}"):
                 return found(*arguments)
 
         return called
@@ -78,8 +78,8 @@ def scan(
     loaded: Loaded,
     folder: Path,
     opened: Callable[[], Devices],
-    moments: Moments,
-    disk: tuple[str, Moment] | None = None,
+    triggers: Triggers,
+    disk: tuple[str, Trigger] | None = None,
 ) -> Ended:
     """Run, or go on with what is in the folder; `disk`: what happens to it, and when."""
     known, error = (folder / "record.sqlite").exists(), None
@@ -88,10 +88,10 @@ def scan(
         Watched.open(folder) if known else Watched.create(folder, {}) as record,
     ):
         assert isinstance(record, Watched)
-        record.moments = moments
+        record.triggers = triggers
         if disk is not None:
             strike: Action = getattr(record, disk[0])
-            moments.plan(*disk[1], strike)
+            triggers.plan(*disk[1], strike)
         before = Progress(tuple(record.readings()), tuple(record.checks())) if known else None
         try:
             scan_session.scan(loaded, make_plan(loaded), record, before)

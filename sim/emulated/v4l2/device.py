@@ -1,8 +1,7 @@
-"""An emulated V4L2 camera: what it is, what it is set to, what is wrong with it.
+"""Emulated V4L2 camera: capabilities, formats, controls and faults.
 
-`EmulatedCamera` is the device that all openings share: formats, controls, faults. What an opening
-has of its own (buffers, stream) is in `sim.emulated.v4l2.stream`; requests arrive by
-`sim.emulated.v4l2.server`.
+`EmulatedCamera` is the state that all open file descriptors share. The buffers and the stream of
+one descriptor are in `sim.emulated.v4l2.stream`; `sim.emulated.v4l2.server` receives requests.
 """
 
 from __future__ import annotations
@@ -21,14 +20,14 @@ from drivers.v4l2 import ioctl as v4l2
 
 PixelFormat = Literal["GREY", "Y10", "Y16", "YUYV"]
 BYTES_PER_PIXEL: Mapping[PixelFormat, int] = {"GREY": 1, "Y10": 2, "Y16": 2, "YUYV": 2}
-Spoilt = Literal["flagged", "short"]
-_GREYS = 128  # the colour that YUYV gives to a grey
+BadFrame = Literal["flagged", "short"]
+_NEUTRAL_CHROMA = 128  # U and V of grey
 _MANUAL = 1
 
 
 @dataclass(frozen=True, slots=True)
 class Exposure:
-    """One exposure of the sensor; `start_s` is of the system's monotonic clock."""
+    """One exposure of the sensor; `start_s` is a time of the monotonic clock."""
 
     exposure_s: float
     gain: int
@@ -44,12 +43,13 @@ Snapshot = Callable[[], object]
 
 
 @dataclass(frozen=True, slots=True)
-class Description:
-    """What an emulated camera can do. Frames come at most `frames_per_s`.
+class Capabilities:
+    """Properties of an emulated camera.
 
-    An exposure ends `overhead_s` before the frame's time stamp: that is the read-out. An exposure
-    that is set reaches the sensor `delay_frames` frames late. A driver that does not tell of
-    filled buffers shows them as empty until they are taken.
+    frames_per_s: upper limit of the frame rate. overhead_s: read-out time, from the end of an
+    exposure to the frame's time stamp. delay_frames: number of frames after which a new exposure
+    time takes effect. reports_filled: False for a driver that shows filled buffers as empty until
+    they are dequeued.
     """
 
     card: str = "Emulated camera"
@@ -60,13 +60,13 @@ class Description:
     delay_frames: int = 0
     row_padding_bytes: int = 0
     stamp_offset_s: float = 0.0
-    tells_filled: bool = True
+    reports_filled: bool = True
     without_controls: frozenset[int] = frozenset()
 
 
 @dataclass(slots=True)
-class Faults:
-    """What is wrong with the camera now; a test sets and clears it while the camera runs."""
+class CameraFaults:
+    """Present faults of the camera; a test sets and clears them while the camera runs."""
 
     unplugged: bool = False
     frozen: bool = False
@@ -76,16 +76,16 @@ class Faults:
     substitute_size: tuple[int, int] | None = None
     refused_controls: set[int] = field(default_factory=set)
     stuck_controls: set[int] = field(default_factory=set)
-    spoilt: deque[Spoilt] = field(default_factory=deque)  # the frames taken next
+    bad_frames: deque[BadFrame] = field(default_factory=deque)  # the next frames
     failing: defaultdict[str, deque[int]] = field(default_factory=lambda: defaultdict(deque))
 
     def fail(self, request: str, error: int = errno.EIO, times: int = 1) -> None:
-        """Let the next `times` requests of this name ("DQBUF", "open", …) end in `error`."""
+        """Refuse the next `times` requests of this name ("DQBUF", "open", …) with `error`."""
         self.failing[request].extend([error] * times)
 
 
 class Refused(Exception):
-    """A request that the device refuses; `number` is the error number that the caller sees."""
+    """Request refused by the device; `number` is the errno that the caller gets."""
 
     def __init__(self, number: int) -> None:
         super().__init__(errno.errorcode.get(number, str(number)))
@@ -106,40 +106,44 @@ def _standard_controls() -> list[v4l2.Control]:
 
 
 class EmulatedCamera:
-    """The device: what it is set to is seen alike by all who have opened it.
+    """Camera whose settings are shared by all open descriptors.
 
-    `snapshot()` is called when an exposure begins and says what the sensor sees; its answer goes
-    to `render(exposure, seen)` once somebody takes that frame: `image[row, column]` in counts.
+    `snapshot()` is called at the start of an exposure and captures the scene; its result is passed
+    to `render(exposure, snapshot)` when the frame is dequeued, which returns `image[row, column]`
+    in counts.
+
+    `requests` counts the requests by name; `streamer` is the one stream that has buffers (others
+    get EBUSY); `times_unplugged` tells a descriptor opened before an unplugging from a newer one.
     """
 
     def __init__(
         self,
         render: Render,
         snapshot: Snapshot = lambda: None,
-        description: Description | None = None,
+        capabilities: Capabilities | None = None,
     ) -> None:
-        self.description = description or Description()
+        self.capabilities = capabilities or Capabilities()
         self.render, self.snapshot = render, snapshot
-        self.faults = Faults()
-        self.requests: Counter[str] = Counter()  # how often each was made, for tests
+        self.faults = CameraFaults()
+        self.requests: Counter[str] = Counter()
         self._lock = threading.Lock()
         self._on_unplug: set[Callable[[], None]] = set()
-        self.streamer: object = None  # the one opening that has buffers; the others get EBUSY
-        self.times_unplugged = 0  # whoever opened it before stays without a device
-        missing = self.description.without_controls
+        self.streamer: object = None
+        self.times_unplugged = 0
+        missing = self.capabilities.without_controls
         self._controls = {c.number: c for c in _standard_controls() if c.number not in missing}
         self._restart()
 
     def _restart(self) -> None:
-        """Power on: everything at its default."""
+        """Reset format and controls to their defaults, as at power-on."""
         self._values = {number: c.default for number, c in self._controls.items()}
-        self.pixel_format: PixelFormat = self.description.formats[0]
-        self.size = self.description.sizes[0]
+        self.pixel_format: PixelFormat = self.capabilities.formats[0]
+        self.size = self.capabilities.sizes[0]
 
     # Faults
 
     def unplug(self) -> None:
-        """Take the camera away: whoever waits for a frame wakes up and finds no device."""
+        """Disconnect the camera: pending waits end with ENODEV."""
         self.faults.unplugged = True
         self.times_unplugged += 1
         with self._lock:
@@ -148,17 +152,17 @@ class EmulatedCamera:
             wake()
 
     def replug(self) -> None:
-        """Bring the camera back, at its defaults."""
+        """Connect the camera again, with default settings."""
         self._restart()
         self.faults.unplugged = False
 
-    def watch_unplug(self, wake: Callable[[], None], watching: bool) -> None:
-        """Call `wake` when the camera is unplugged, or no longer."""
+    def watch_unplug(self, wake: Callable[[], None], enabled: bool) -> None:
+        """Enable or disable calling `wake` when the camera is unplugged."""
         with self._lock:
-            (self._on_unplug.add if watching else self._on_unplug.discard)(wake)
+            (self._on_unplug.add if enabled else self._on_unplug.discard)(wake)
 
     def admit(self, request: str) -> None:
-        """Refuse a request that is to fail now."""
+        """Count a request; raise `Refused` if a fault makes it fail."""
         self.requests[request] += 1
         if self.faults.unplugged:
             raise Refused(errno.ENOENT if request == "open" else errno.ENODEV)
@@ -168,19 +172,19 @@ class EmulatedCamera:
     # Controls
 
     def controls(self, *, current: bool = True) -> Mapping[int, v4l2.Control]:
-        """The camera's controls by number, with the values they stand at."""
+        """Return the controls by number, with their current or default values."""
         if not current:
             return self._controls
         return {n: replace(c, value=self._values[n]) for n, c in self._controls.items()}
 
     def value(self, number: int) -> int:
-        """What a control stands at."""
+        """Return the value of a control."""
         if number not in self._values:
             raise Refused(errno.EINVAL)
         return self._values[number]
 
     def set_value(self, number: int, value: int) -> int:
-        """Set a control as drivers do: clamped to its range and steps without a word."""
+        """Set a control and return its value, silently clamped to range and step as Linux does."""
         control = self._controls.get(number)
         if control is None:
             raise Refused(errno.EINVAL)
@@ -193,7 +197,7 @@ class EmulatedCamera:
         return self._values[number]
 
     def _is_automatic(self, number: int) -> bool:
-        """The exposure cannot be set while the camera sets it itself."""
+        """True for the exposure while auto-exposure is on: it cannot be set then."""
         automatic = self._values.get(v4l2.EXPOSURE_AUTO, _MANUAL) != _MANUAL
         return number == v4l2.EXPOSURE_ABSOLUTE and automatic
 
@@ -205,41 +209,43 @@ class EmulatedCamera:
 
     @property
     def exposure_s(self) -> float:
-        """The exposure that is set now."""
+        """Present exposure time in seconds."""
         return self._values[v4l2.EXPOSURE_ABSOLUTE] * 1e-4
 
     @property
     def gain(self) -> int:
-        """The gain that is set now; 0 where the camera has none."""
+        """Present gain; 0 if the camera has no such control."""
         return self._values.get(v4l2.GAIN, 0)
 
-    # Picture
+    # Format and frames
 
-    def nearest(self, asked: str, width: int, height: int) -> v4l2.Format:
-        """The format that the camera takes when it is asked for this one: drivers adjust."""
-        faults, able = self.faults, self.description
-        chosen = next((f for f in able.formats if f == asked), able.formats[0])
+    def nearest_format(self, name: str, width: int, height: int) -> v4l2.Format:
+        """Return the supported format nearest to the requested one, as drivers adjust it."""
+        faults, formats = self.faults, self.capabilities.formats
+        chosen = next((f for f in formats if f == name), formats[0])
         chosen = faults.substitute_format or chosen
-        size = min(able.sizes, key=lambda s: abs(s[0] - width) + abs(s[1] - height))
+        size = min(self.capabilities.sizes, key=lambda s: abs(s[0] - width) + abs(s[1] - height))
         return self._format(chosen, faults.substitute_size or size)
 
-    def take_format(self, wanted: v4l2.Format) -> None:
-        """Use this picture from now on."""
-        self.pixel_format = next(f for f in BYTES_PER_PIXEL if f == wanted.name)
-        self.size = (wanted.width_px, wanted.height_px)
+    def set_format(self, chosen: v4l2.Format) -> None:
+        """Use this format from now on."""
+        self.pixel_format = next(f for f in BYTES_PER_PIXEL if f == chosen.name)
+        self.size = (chosen.width_px, chosen.height_px)
 
     def format(self) -> v4l2.Format:
-        """The picture that is set now."""
+        """Return the present format."""
         return self._format(self.pixel_format, self.size)
 
     def _format(self, name: PixelFormat, size: tuple[int, int]) -> v4l2.Format:
-        per_line = size[0] * BYTES_PER_PIXEL[name] + self.description.row_padding_bytes
+        per_line = size[0] * BYTES_PER_PIXEL[name] + self.capabilities.row_padding_bytes
         return v4l2.Format(name, *size, per_line, per_line * size[1])
 
-    def picture(self, exposure: Exposure, seen: object) -> NDArray[np.uint8]:
-        """The bytes of a frame, rendered now."""
-        image = self.render(exposure, seen)
+    def frame_bytes(self, exposure: Exposure, snapshot: object) -> NDArray[np.uint8]:
+        """Render a frame; return its bytes in the exposure's pixel format, shape (bytes,)."""
+        image = self.render(exposure, snapshot)
         if exposure.pixel_format == "YUYV" and image.ndim == 2:
-            image = np.dstack([image.astype(np.uint8), np.full(image.shape, _GREYS, np.uint8)])
+            image = np.dstack(
+                [image.astype(np.uint8), np.full(image.shape, _NEUTRAL_CHROMA, np.uint8)]
+            )
         wide = exposure.pixel_format in ("Y10", "Y16")
         return np.ascontiguousarray(image, "<u2" if wide else np.uint8).view(np.uint8).ravel()

@@ -1,13 +1,13 @@
 /* An emulated V4L2 device for a process started with this library in LD_PRELOAD.
  *
- * open() of the path in GONIO_V4L2_DEVICE connects to the device model that listens on the
- * SOCK_SEQPACKET socket in GONIO_V4L2_SOCKET. The model answers with an error number (0: opened)
- * and, when opened, two descriptors:
- *   an eventfd, readable while a filled buffer waits: the application's descriptor, so that its
- *   select() and poll() are the system's own;
- *   a memory file, which mmap() of the application's descriptor maps: the buffers.
+ * open() of the path in GONIO_V4L2_DEVICE connects to the emulated camera that listens on the
+ * SOCK_SEQPACKET socket in GONIO_V4L2_SOCKET. The camera answers with an error number (0: opened)
+ * and, if opened, two descriptors:
+ *   an eventfd, readable while a filled buffer waits: it becomes the application's descriptor, so
+ *   that select() and poll() on it are the system's own;
+ *   a memory file with the buffers, mapped by mmap() of the application's descriptor.
  * Each ioctl is one message, {request, size, argument}, answered by {error number, argument}.
- * Everything that a device does is done by the model; nothing else of the process is touched.
+ * All device behaviour is in the emulated camera; other descriptors go to the system unchanged.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -26,29 +26,29 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-enum { MOST_OPEN = 32, MOST_BYTES = 512 };
+enum { MAX_OPEN = 32, MAX_BYTES = 512 };
 
-struct opening {
-    int descriptor; /* the application's; -1: this place is free */
+struct device {
+    int descriptor; /* the application's; -1: entry is free */
     int socket;
     int memory;
     int nonblocking;
-    pthread_mutex_t one_call; /* a question and its answer belong together */
+    pthread_mutex_t exchange; /* held from a request to its answer */
 };
 
-struct question {
+struct request {
     uint32_t request;
     uint32_t size;
-    char argument[MOST_BYTES];
+    char argument[MAX_BYTES];
 };
 
 struct answer {
     int32_t error;
-    char argument[MOST_BYTES];
+    char argument[MAX_BYTES];
 };
 
-static struct opening openings[MOST_OPEN];
-static pthread_mutex_t table = PTHREAD_MUTEX_INITIALIZER;
+static struct device devices[MAX_OPEN];
+static pthread_mutex_t devices_lock = PTHREAD_MUTEX_INITIALIZER;
 
 static int (*system_open)(const char *, int, ...);
 static int (*system_open64)(const char *, int, ...);
@@ -61,7 +61,7 @@ static void *(*system_mmap64)(void *, size_t, int, int, int, off64_t);
 
 static pthread_once_t once = PTHREAD_ONCE_INIT;
 
-/* dlsym() gives an object pointer; ISO C has no cast from it to a function pointer. */
+/* dlsym() returns an object pointer, which ISO C cannot cast to a function pointer. */
 static void find_system(void *function, const char *name)
 {
     void *found = dlsym(RTLD_NEXT, name);
@@ -70,9 +70,9 @@ static void find_system(void *function, const char *name)
 
 static void prepare(void)
 {
-    for (int i = 0; i < MOST_OPEN; i++) {
-        openings[i].descriptor = -1;
-        pthread_mutex_init(&openings[i].one_call, NULL);
+    for (int i = 0; i < MAX_OPEN; i++) {
+        devices[i].descriptor = -1;
+        pthread_mutex_init(&devices[i].exchange, NULL);
     }
     find_system(&system_open, "open");
     find_system(&system_open64, "open64");
@@ -84,18 +84,18 @@ static void prepare(void)
     find_system(&system_mmap64, "mmap64");
 }
 
-static struct opening *opening_of(int descriptor)
+static struct device *device_of(int descriptor)
 {
-    struct opening *found = NULL;
+    struct device *found = NULL;
 
     pthread_once(&once, prepare);
     if (descriptor < 0)
         return NULL;
-    pthread_mutex_lock(&table);
-    for (int i = 0; i < MOST_OPEN && !found; i++)
-        if (openings[i].descriptor == descriptor)
-            found = &openings[i];
-    pthread_mutex_unlock(&table);
+    pthread_mutex_lock(&devices_lock);
+    for (int i = 0; i < MAX_OPEN && !found; i++)
+        if (devices[i].descriptor == descriptor)
+            found = &devices[i];
+    pthread_mutex_unlock(&devices_lock);
     return found;
 }
 
@@ -107,7 +107,7 @@ static int is_emulated(const char *path)
     return device && path && strcmp(device, path) == 0;
 }
 
-static int connected(void)
+static int connect_to_camera(void)
 {
     const char *path = getenv("GONIO_V4L2_SOCKET");
     struct sockaddr_un address = {.sun_family = AF_UNIX};
@@ -124,8 +124,8 @@ static int connected(void)
     return -1;
 }
 
-/* The model's greeting: 0 and the two descriptors, or the error number of the failed opening. */
-static int greeted(int s, int descriptors[2])
+/* First message of the camera: 0 and the two descriptors, or the error number of open(). */
+static int receive_descriptors(int s, int descriptors[2])
 {
     int32_t error = 0;
     char control[CMSG_SPACE(2 * sizeof(int))];
@@ -148,31 +148,31 @@ static int greeted(int s, int descriptors[2])
     return 0;
 }
 
-static int remember(int descriptor, int s, int memory, int flags)
+static int register_device(int descriptor, int s, int memory, int flags)
 {
-    int place = -1;
+    int entry = -1;
 
-    pthread_mutex_lock(&table);
-    for (int i = 0; i < MOST_OPEN && place < 0; i++)
-        if (openings[i].descriptor == -1)
-            place = i;
-    if (place >= 0) {
-        openings[place].socket = s;
-        openings[place].memory = memory;
-        openings[place].nonblocking = (flags & O_NONBLOCK) != 0;
-        openings[place].descriptor = descriptor;
+    pthread_mutex_lock(&devices_lock);
+    for (int i = 0; i < MAX_OPEN && entry < 0; i++)
+        if (devices[i].descriptor == -1)
+            entry = i;
+    if (entry >= 0) {
+        devices[entry].socket = s;
+        devices[entry].memory = memory;
+        devices[entry].nonblocking = (flags & O_NONBLOCK) != 0;
+        devices[entry].descriptor = descriptor;
     }
-    pthread_mutex_unlock(&table);
-    return place >= 0;
+    pthread_mutex_unlock(&devices_lock);
+    return entry >= 0;
 }
 
 static int open_emulated(int flags)
 {
     int descriptors[2] = {-1, -1};
-    int s = connected();
-    int error = s < 0 ? ENOENT : greeted(s, descriptors);
+    int s = connect_to_camera();
+    int error = s < 0 ? ENOENT : receive_descriptors(s, descriptors);
 
-    if (!error && !remember(descriptors[0], s, descriptors[1], flags)) {
+    if (!error && !register_device(descriptors[0], s, descriptors[1], flags)) {
         system_close(descriptors[0]);
         system_close(descriptors[1]);
         error = EMFILE;
@@ -218,8 +218,8 @@ OPEN_LIKE(open64)
 OPENAT_LIKE(openat)
 OPENAT_LIKE(openat64)
 
-/* A signal must not part a question from its answer. */
-static ssize_t sent(int s, const void *bytes, size_t size)
+/* Retried after a signal, so that a request always gets its answer. */
+static ssize_t send_request(int s, const void *bytes, size_t size)
 {
     ssize_t done;
 
@@ -229,7 +229,7 @@ static ssize_t sent(int s, const void *bytes, size_t size)
     return done;
 }
 
-static ssize_t got(int s, void *bytes, size_t size)
+static ssize_t receive(int s, void *bytes, size_t size)
 {
     ssize_t done;
 
@@ -239,23 +239,23 @@ static ssize_t got(int s, void *bytes, size_t size)
     return done;
 }
 
-/* One question and its answer. A model that is gone is a device that is gone. */
-static int ask(struct opening *device, unsigned long request, void *argument)
+/* One request and its answer; ENODEV if the camera has gone. */
+static int exchange_request(struct device *device, unsigned long request, void *argument)
 {
-    size_t size = _IOC_SIZE(request), head = offsetof(struct question, argument);
-    struct question question = {.request = (uint32_t)request, .size = (uint32_t)size};
+    size_t size = _IOC_SIZE(request), head = offsetof(struct request, argument);
+    struct request message = {.request = (uint32_t)request, .size = (uint32_t)size};
     struct answer answer;
     ssize_t received;
 
-    if (size > MOST_BYTES)
+    if (size > MAX_BYTES)
         return ENOTTY;
     if (size)
-        memcpy(question.argument, argument, size);
-    pthread_mutex_lock(&device->one_call);
-    received = sent(device->socket, &question, head + size);
+        memcpy(message.argument, argument, size);
+    pthread_mutex_lock(&device->exchange);
+    received = send_request(device->socket, &message, head + size);
     if (received > 0)
-        received = got(device->socket, &answer, sizeof answer);
-    pthread_mutex_unlock(&device->one_call);
+        received = receive(device->socket, &answer, sizeof answer);
+    pthread_mutex_unlock(&device->exchange);
     head = offsetof(struct answer, argument);
     if (received < (ssize_t)head)
         return ENODEV;
@@ -266,7 +266,7 @@ static int ask(struct opening *device, unsigned long request, void *argument)
 
 int ioctl(int descriptor, unsigned long request, ...)
 {
-    struct opening *device = opening_of(descriptor);
+    struct device *device = device_of(descriptor);
     va_list rest;
     void *argument;
     int error;
@@ -276,11 +276,11 @@ int ioctl(int descriptor, unsigned long request, ...)
     va_end(rest);
     if (!device || _IOC_TYPE(request) != 'V')
         return system_ioctl(descriptor, request, argument);
-    error = ask(device, request, argument);
+    error = exchange_request(device, request, argument);
     while (error == EAGAIN && !device->nonblocking) {
         struct pollfd wait = {.fd = descriptor, .events = POLLIN};
         poll(&wait, 1, -1);
-        error = ask(device, request, argument);
+        error = exchange_request(device, request, argument);
     }
     if (!error)
         return 0;
@@ -292,7 +292,7 @@ int ioctl(int descriptor, unsigned long request, ...)
     void *name(void *at, size_t length, int protection, int flags, int descriptor,                 \
                offset_type offset)                                                                 \
     {                                                                                              \
-        struct opening *device = opening_of(descriptor);                                           \
+        struct device *device = device_of(descriptor);                                             \
         return system_##name(at, length, protection, flags, device ? device->memory : descriptor,  \
                              offset);                                                              \
     }
@@ -302,14 +302,14 @@ MMAP_LIKE(mmap64, off64_t)
 
 int close(int descriptor)
 {
-    struct opening *device = opening_of(descriptor);
+    struct device *device = device_of(descriptor);
 
     if (device) {
-        pthread_mutex_lock(&table);
+        pthread_mutex_lock(&devices_lock);
         device->descriptor = -1;
         system_close(device->socket);
         system_close(device->memory);
-        pthread_mutex_unlock(&table);
+        pthread_mutex_unlock(&devices_lock);
     }
     return system_close(descriptor);
 }

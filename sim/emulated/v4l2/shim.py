@@ -1,7 +1,8 @@
-"""The library that lets OpenCV open an emulated camera: compiled where it is needed.
+"""Build of the preloaded library through which OpenCV opens an emulated camera.
 
-A process uses it when it is started with `environment(...)`: the loader reads LD_PRELOAD at the
-start only. The device model (`sim.emulated.v4l2.server`) may run in that process or in another one.
+A process uses the library if it is started with `shim_environment(...)`: the dynamic loader reads
+LD_PRELOAD only at the start. The camera (`sim.emulated.v4l2.server`) may run in that process or in
+another.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ _SOURCE = Path(__file__).with_name("shim.c")
 _OPTIONS = ("-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC")
 
 
-def compiled(folder: Path) -> Path:
+def compile_shim(folder: Path) -> Path:
     """Compile the library into `folder` and return its path."""
     compiler = shutil.which("cc")
     if compiler is None:
@@ -35,8 +36,8 @@ def compiled(folder: Path) -> Path:
     return library
 
 
-def environment(shim: Path, device: str, socket: Path) -> dict[str, str]:
-    """What to add to a process's environment so that `device` is the model behind `socket`."""
+def shim_environment(shim: Path, device: str, socket: Path) -> dict[str, str]:
+    """Return the environment variables that make `device` the camera behind `socket`."""
     before = os.environ.get("LD_PRELOAD", "")
     return {
         "LD_PRELOAD": f"{shim} {before}".strip(),

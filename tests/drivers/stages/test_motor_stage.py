@@ -173,7 +173,7 @@ def test_an_alarm_is_named_with_its_code_and_nothing_moves(
 
 
 def test_a_reference_that_is_not_found_ends_the_homing(bench: Bench) -> None:
-    bench.motor.refuses_home = True
+    bench.motor.homing_fails = True
     with pytest.raises(DeviceError, match=r"reference was not found within 3 s.*reference switch"):
         bench.stage.home()
     until(lambda: not bench.motor.homing)

@@ -199,7 +199,7 @@ def test_a_held_motor_is_the_drives_overload(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_a_reference_that_is_not_found_is_an_error_and_a_stop() -> None:
     with bench("pty", FAST, replace(LIMITS, homing_s=0.2)) as at:
-        at.motor.refuses_home = True
+        at.motor.homing_fails = True
         stage = at.open()
         with pytest.raises(DeviceError, match=r"not found within 0.2 s"):
             stage.home()

@@ -20,7 +20,7 @@ from drivers.v4l2.listing import video_devices
 from drivers.v4l2.settings import PixelFormat, V4l2Settings
 from instrument.errors import DeviceError
 from sim.emulated.v4l2.device import Exposure
-from sim.emulated.v4l2.shim import compiled
+from sim.emulated.v4l2.shim import compile_shim
 from tests.support.v4l2.remote_camera import (
     DEVICE,
     QUICK,
@@ -210,7 +210,7 @@ def test_stamps_of_another_clock(remote: RemoteCamera, bench: Bench) -> None:
 
 
 def test_a_driver_that_does_not_tell_of_torn_frames(remote: RemoteCamera, bench: Bench) -> None:
-    with served(remote, bench, tells_filled=False):
+    with served(remote, bench, reports_filled=False):
         assert "does not tell of torn frames" in remote.ask("open", SETTINGS)
         bench.level = 3
         assert [level(frame) for frame in remote.grab(3)] == [3, 3, 3]
@@ -295,7 +295,7 @@ def test_without_a_compiler_the_emulated_camera_says_so(
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(DeviceError, match=r"no C compiler: `cc` is not on the PATH; install one"):
-        compiled(tmp_path)
+        compile_shim(tmp_path)
 
 
 def test_settings_are_what_the_rig_file_will_hold() -> None:

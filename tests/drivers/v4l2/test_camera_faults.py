@@ -134,7 +134,7 @@ def test_another_camera_in_its_place(remote: RemoteCamera, bench: Bench) -> None
         camera.unplug()
         with pytest.raises(DeviceError, match="is gone"):
             remote.grab(1)
-        camera.description = replace(camera.description, card="A webcam")
+        camera.capabilities = replace(camera.capabilities, card="A webcam")
         camera.replug()
         with pytest.raises(DeviceError, match="A webcam answers where Emulated camera did"):
             remote.grab(1)
@@ -232,9 +232,9 @@ def test_torn_frames_are_refused_and_others_taken(
         for _ in range(3):
             remote.begin("grab", 30)
             bench.wait_exposures(8)
-            camera.faults.spoilt.extend([kind] * 3)  # type: ignore[list-item]  # one of the two
+            camera.faults.bad_frames.extend([kind] * 3)  # type: ignore[list-item]  # one of the two
             frames = remote.answer()
-            assert not camera.faults.spoilt
+            assert not camera.faults.bad_frames
             values = [np.unique(frame.image) for frame in frames]
             assert all(len(value) == 1 for value in values)
             gaps = np.diff([int(value[0]) for value in values])
@@ -250,10 +250,10 @@ def test_torn_frames_in_a_series_are_an_error(
 ) -> None:
     with served(remote, bench) as camera:
         remote.ask("open", SETTINGS)
-        camera.faults.spoilt.extend([kind] * 40)  # type: ignore[list-item]  # one of the two
+        camera.faults.bad_frames.extend([kind] * 40)  # type: ignore[list-item]  # one of the two
         with pytest.raises(DeviceError, match=f"{WHO}: 4 bad frames in a series, .*{message}"):
             remote.grab(1)
-        camera.faults.spoilt.clear()
+        camera.faults.bad_frames.clear()
         assert len(remote.grab(2)) == 2
 
 

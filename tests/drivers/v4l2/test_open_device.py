@@ -13,7 +13,7 @@ import pytest
 
 from drivers.v4l2 import ioctl as v4l2
 from instrument.errors import DeviceError
-from sim.emulated.v4l2.device import Faults
+from sim.emulated.v4l2.device import CameraFaults
 from tests.support.v4l2.remote_camera import (
     DEVICE,
     SETTINGS,
@@ -31,8 +31,8 @@ def bench() -> Bench:
     return Bench()
 
 
-def fault(**values: Any) -> Callable[[Faults], None]:
-    def apply(faults: Faults) -> None:
+def fault(**values: Any) -> Callable[[CameraFaults], None]:
+    def apply(faults: CameraFaults) -> None:
         for name, value in values.items():
             setattr(faults, name, value)
 
@@ -102,7 +102,7 @@ OPENING = [
 def test_an_opening_that_went_wrong_says_what_was_asked_and_given(
     remote: RemoteCamera,
     bench: Bench,
-    spoil: Callable[[Faults], None],
+    spoil: Callable[[CameraFaults], None],
     changes: dict[str, Any],
     message: str,
 ) -> None:

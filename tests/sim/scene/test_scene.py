@@ -137,7 +137,7 @@ def test_too_long_an_exposure_saturates_and_stays_at_full_scale(demo: Loaded) ->
 
 def test_an_exposure_that_the_camera_does_not_have_is_refused(demo: Loaded) -> None:
     eye = SimulatedCamera(scene_of(demo), SimulatedClock())
-    with pytest.raises(DeviceError, match=r"exposure 9 s asked for; it can do 0\.0005 to 2 s"):
+    with pytest.raises(DeviceError, match=r"exposure 9 s asked for; allowed: 0\.0005 to 2 s"):
         eye.set_exposure_s(9.0)
 
 

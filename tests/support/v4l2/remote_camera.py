@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 
 from drivers.v4l2.settings import V4l2Settings
 from instrument.devices import Frame
-from sim.emulated.v4l2.device import Description, EmulatedCamera, Exposure
+from sim.emulated.v4l2.device import Capabilities, EmulatedCamera, Exposure
 from sim.emulated.v4l2.server import V4l2Server
-from sim.emulated.v4l2.shim import compiled, environment
+from sim.emulated.v4l2.shim import compile_shim, shim_environment
 from tests.support.paths import ROOT
 
 if which("cc") is None:
@@ -39,7 +39,7 @@ if which("cc") is None:
 DEVICE = "/dev/v4l/by-id/usb-emulated-camera"
 DEADLINE_S = 20.0
 SETTINGS = V4l2Settings(DEVICE, "Y16", 64, 48, 16, 0.001, 2.0, gain=100)
-QUICK = Description(frames_per_s=200, overhead_s=0.001)
+QUICK = Capabilities(frames_per_s=200, overhead_s=0.001)
 
 
 class RemoteCamera:
@@ -48,7 +48,7 @@ class RemoteCamera:
     def __init__(self, folder: Path) -> None:
         self.socket = folder / "camera"
         ours, theirs = socket.socketpair()
-        added = environment(compiled(folder), DEVICE, self.socket)
+        added = shim_environment(compile_shim(folder), DEVICE, self.socket)
         self._process = subprocess.Popen(
             [sys.executable, "-m", "tests.support.v4l2.child", str(theirs.fileno())],
             env=os.environ | added,
@@ -137,10 +137,10 @@ def steps(frame: Frame) -> int:
 
 @contextmanager
 def served(
-    remote: RemoteCamera, bench: Bench, description: Description = QUICK, **able: Any
+    remote: RemoteCamera, bench: Bench, capabilities: Capabilities = QUICK, **changes: Any
 ) -> Iterator[EmulatedCamera]:
     """The device model while a test needs it; the child lets go of it at the end."""
-    camera = EmulatedCamera(bench.render, bench.snapshot, replace(description, **able))
+    camera = EmulatedCamera(bench.render, bench.snapshot, replace(capabilities, **changes))
     with V4l2Server(camera, remote.socket):
         try:
             yield camera

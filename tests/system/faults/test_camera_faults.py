@@ -27,10 +27,10 @@ from instrument.config.protocol import References
 from instrument.devices import Frame
 from instrument.errors import DeviceError
 from instrument.record.reading import Reading
-from sim.emulated.v4l2.device import EmulatedCamera, Exposure, Spoilt
+from sim.emulated.v4l2.device import BadFrame, EmulatedCamera, Exposure
 from sim.emulated.v4l2.server import V4l2Server
 from sim.faults.faults import Faults
-from sim.faults.triggers import Moments, When
+from sim.faults.triggers import Triggers, When
 from sim.scene.scene import Scene
 from sim.scene.sensor import Sensor
 from tests.support import faulty_scan
@@ -85,11 +85,11 @@ class Relayed:
     More frames than one, asked for at once, are a moment of their own: a series.
     """
 
-    def __init__(self, remote: RemoteCamera, moments: Moments) -> None:
-        self._remote, self._moments = remote, moments
+    def __init__(self, remote: RemoteCamera, triggers: Triggers) -> None:
+        self._remote, self._triggers = remote, triggers
 
     def grab(self, count: int) -> list[Frame]:
-        with self._moments.call("camera.series" if count > 1 else "camera.single"):
+        with self._triggers.call("camera.series" if count > 1 else "camera.single"):
             return self._asked("grab", count)  # type: ignore[no-any-return]  # over a pipe
 
     def set_exposure_s(self, exposure_s: float) -> float:
@@ -131,7 +131,7 @@ class Looking:
 
 @contextmanager
 def bench(
-    loaded: Loaded, remote: RemoteCamera, moments: Moments
+    loaded: Loaded, remote: RemoteCamera, triggers: Triggers
 ) -> Iterator[tuple[EmulatedCamera, Devices]]:
     """A new camera, opened, and the devices about it."""
     looking, faults = Looking(), Faults()
@@ -142,9 +142,9 @@ def bench(
     looking.scene = faults.scene
     with V4l2Server(camera, remote.socket):
         remote.ask("open", settings(loaded))
-        watched = Watching("camera", Relayed(remote, moments), moments)
+        watched = Watching("camera", Relayed(remote, triggers), triggers)
         axes = dict(simulated.axes)
-        stage = Watching("theta_r", axes["theta_r"]._stage, moments)
+        stage = Watching("theta_r", axes["theta_r"]._stage, triggers)
         axes["theta_r"] = Axis("theta_r", stage, loaded.rig.axes.theta_r, simulated.clock)  # type: ignore[arg-type]  # passes all on
         try:
             yield camera, replace(simulated, axes=axes, camera=watched)  # type: ignore[arg-type]  # passes all on
@@ -158,12 +158,12 @@ def scan(
     folder: Path,
     *happening: tuple[tuple[When, str, int], Strike],
 ) -> Ended:
-    moments = Moments()
-    with bench(loaded, remote, moments) as (camera, devices):
+    triggers = Triggers()
+    with bench(loaded, remote, triggers) as (camera, devices):
         for moment, strike in happening:
-            moments.plan(*moment, lambda strike=strike: strike(camera))
-        ended = faulty_scan.scan(loaded, folder, lambda: devices, moments)
-    assert moments.left == 0
+            triggers.plan(*moment, lambda strike=strike: strike(camera))
+        ended = faulty_scan.scan(loaded, folder, lambda: devices, triggers)
+    assert triggers.pending == 0
     return ended
 
 
@@ -178,7 +178,7 @@ def whole(
     return ended.readings
 
 
-def spoil_one(kind: Spoilt) -> Strike:
+def spoil_one(kind: BadFrame) -> Strike:
     """A frame that counts: those that were waiting when it was asked for have been dropped."""
 
     def strike(camera: EmulatedCamera) -> None:
@@ -186,7 +186,7 @@ def spoil_one(kind: Spoilt) -> Strike:
 
         def snapshot() -> object:
             if next(left, None) == 5:
-                camera.faults.spoilt.append(kind)
+                camera.faults.bad_frames.append(kind)
             return look()
 
         camera.snapshot = snapshot
@@ -195,7 +195,7 @@ def spoil_one(kind: Spoilt) -> Strike:
 
 
 def spoil_all(camera: EmulatedCamera) -> None:
-    camera.faults.spoilt.extend(["flagged"] * 10_000)
+    camera.faults.bad_frames.extend(["flagged"] * 10_000)
 
 
 def clamp(camera: EmulatedCamera) -> None:
@@ -217,7 +217,7 @@ def test_a_bad_frame_is_taken_anew(
     remote: RemoteCamera,
     whole: list[Reading],
     tmp_path: Path,
-    kind: Spoilt,
+    kind: BadFrame,
     state: str,
 ) -> None:
     ended = scan(short, remote, tmp_path / "run", (AT[state], spoil_one(kind)))

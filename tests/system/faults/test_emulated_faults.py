@@ -28,7 +28,7 @@ from instrument.errors import DeviceError
 from instrument.record.reading import Reading
 from sim.emulated.wire import Fault
 from sim.faults.faults import Faults
-from sim.faults.triggers import Moments, When
+from sim.faults.triggers import Triggers, When
 from sim.scene.scene import Scene
 from tests.support import faulty_scan
 from tests.support.faulty_scan import Ended, Watching, require_named
@@ -134,22 +134,22 @@ def short() -> Loaded:
     return changed(small, rig={"axes": axes}, sweeps=[sweep], references=References())
 
 
-def devices_of(loaded: Loaded, bench: Bench, moments: Moments) -> tuple[Devices, Witness]:
+def devices_of(loaded: Loaded, bench: Bench, triggers: Triggers) -> tuple[Devices, Witness]:
     faults = Faults()
     devices = open_devices(loaded, faults)
     assert faults.scene is not None
-    stage = Watching("theta_r", bench.stage, moments)
+    stage = Watching("theta_r", bench.stage, triggers)
     axis = Axis("theta_r", stage, loaded.rig.axes.theta_r, SystemClock())  # type: ignore[arg-type]  # passes all on
     witness = Witness(devices.camera, bench, faults.scene)
-    camera = Watching("camera", witness, moments)
+    camera = Watching("camera", witness, triggers)
     axes = {**devices.axes, "theta_r": axis}
     return replace(devices, axes=axes, camera=camera), witness  # type: ignore[arg-type]  # passes all on
 
 
-def scan(loaded: Loaded, bench: Bench, folder: Path, moments: Moments) -> Ended:
+def scan(loaded: Loaded, bench: Bench, folder: Path, triggers: Triggers) -> Ended:
     """Run, or go on; each accepted reading was taken where it should be."""
-    devices, witness = devices_of(loaded, bench, moments)
-    ended = faulty_scan.scan(loaded, folder, lambda: devices, moments)
+    devices, witness = devices_of(loaded, bench, triggers)
+    ended = faulty_scan.scan(loaded, folder, lambda: devices, triggers)
     for reading in ended.readings[ended.before :]:
         stood_deg = witness.stood_deg[reading.step]
         assert stood_deg
@@ -160,7 +160,7 @@ def scan(loaded: Loaded, bench: Bench, folder: Path, moments: Moments) -> Ended:
 def whole_scan(loaded: Loaded, bench: Bench, folder: Path) -> list[Reading]:
     """Run or go on to the end; on a busy machine the emulated controller itself may be too late."""
     for last in (False, False, True):
-        ended = scan(loaded, bench, folder, Moments())
+        ended = scan(loaded, bench, folder, Triggers())
         if ended.error is None or last:
             break
         assert UNHEARD in str(ended.error)
@@ -204,13 +204,13 @@ def test_a_fault_in_a_state(
     names = list(EVERY)
     chosen = names if slow else [names[(2 * number + n) % len(names)] for n in (0, 1)]
     for name in chosen:
-        moments, folder = Moments(), tmp_path / name
+        triggers, folder = Triggers(), tmp_path / name
         with BENCHES[kind]() as bench:
-            moments.plan(*STATES[state], partial(EVERY[name], bench))
-            ended = scan(short, bench, folder, moments)
+            triggers.plan(*STATES[state], partial(EVERY[name], bench))
+            ended = scan(short, bench, folder, triggers)
             assert ended.readings == sound(kind)[: len(ended.readings)]
             if ended.error is None:
-                assert moments.left == 0
+                assert triggers.pending == 0
                 require_got_over(ended, name, state)
             else:
                 require_stopped(ended, bench, name, state, folder)
@@ -246,7 +246,7 @@ def require_still(bench: Bench) -> None:
 @contextmanager
 def seen_to(bench: Bench) -> Iterator[Bench]:
     """The same controller, put right and asked anew."""
-    bench.wire.heal()
+    bench.wire.clear_faults()
     bench.motor.alarm = ""
     bench.motor.stop()
     bench.stage.close()

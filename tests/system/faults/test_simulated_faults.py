@@ -21,15 +21,15 @@ from instrument.record.record import Record
 from sim.faults.faults import CAMERA, LAMP, OPERATOR, STAGE, Faults
 from sim.faults.triggers import When
 from tests.support import faulty_scan
-from tests.support.faulty_scan import Ended, Moment, require_named
+from tests.support.faulty_scan import Ended, Trigger, require_named
 from tests.support.scans import small_scan, undated
 
 
 def scan(
-    loaded: Loaded, folder: Path, faults: Faults, disk: tuple[str, Moment] | None = None
+    loaded: Loaded, folder: Path, faults: Faults, disk: tuple[str, Trigger] | None = None
 ) -> Ended:
     return faulty_scan.scan(
-        loaded, folder, lambda: open_devices(loaded, faults), faults.moments, disk
+        loaded, folder, lambda: open_devices(loaded, faults), faults.triggers, disk
     )
 
 
@@ -44,7 +44,7 @@ class Sound:
 
     readings: list[Reading]
     calls: list[str]
-    states: dict[str, Moment]
+    states: dict[str, Trigger]
 
 
 @pytest.fixture(scope="module")
@@ -52,11 +52,11 @@ def sound(small: Loaded, tmp_path_factory: pytest.TempPathFactory) -> Sound:
     faults = Faults()
     ended = scan(small, tmp_path_factory.mktemp("sound") / "run", faults)
     assert ended.error is None
-    calls = faults.moments.calls
+    calls = faults.triggers.calls
     return Sound(ended.readings, calls, states(calls))
 
 
-def states(calls: list[str]) -> dict[str, Moment]:
+def states(calls: list[str]) -> dict[str, Trigger]:
     """A moment in each state of the engine, the later ones at the eighth step of the scan."""
     accepted = [n for n, call in enumerate(calls) if call == "record.add_reading"]
     grabs = (n for n, call in enumerate(calls) if call == "camera.grab" and n > accepted[6])
@@ -73,7 +73,7 @@ def states(calls: list[str]) -> dict[str, Moment]:
     }
 
 
-def moment(calls: list[str], number: int, when: When = "at") -> Moment:
+def moment(calls: list[str], number: int, when: When = "at") -> Trigger:
     """A call of the trace, as a fault names it."""
     return when, calls[number], calls[: number + 1].count(calls[number])
 
@@ -85,15 +85,15 @@ def reached(state: str) -> int:
 
 # What the operator is told: which error, and what it says of device and cause.
 STOPS: dict[tuple[str, str], tuple[type[GonioError], str]] = {
-    ("theta_r", "does not answer"): (DeviceError, "theta_r: no answer.*look at its power"),
-    ("theta_r", "stalls"): (DeviceError, "theta_r: (stalled|its reference was not).*look for what"),
+    ("theta_r", "does not answer"): (DeviceError, "theta_r: no answer.*check its power"),
+    ("theta_r", "stalls"): (DeviceError, "theta_r: (stalled|its reference was not).*find out what"),
     ("theta_r", "stops short"): (DeviceError, "theta_r: stands at .* instead of .*look for what"),
     ("theta_r", "slips"): (DeviceError, "theta_r: after the frames.*stands at.*look for what has"),
-    ("theta_r", "loses its reference"): (DeviceError, "theta_r: not homed any more: look at"),
-    ("theta_r", "meets its limit switch"): (DeviceError, "theta_r: limit switch met.*look at"),
-    ("camera", "gives torn frames"): (DeviceError, "camera: 4 bad frames in a series.*look at"),
-    ("camera", "is unplugged"): (DeviceError, "camera: is gone.*look at the USB cable"),
-    ("lamp", "sticks"): (DeviceError, "lamp: its shutter does not .*look at its cable"),
+    ("theta_r", "loses its reference"): (DeviceError, "theta_r: reference lost: check"),
+    ("theta_r", "meets its limit switch"): (DeviceError, "theta_r: limit switch met.*find out why"),
+    ("camera", "gives torn frames"): (DeviceError, "camera: 4 bad frames in a row.*check"),
+    ("camera", "is unplugged"): (DeviceError, "camera: not found.*check the USB cable"),
+    ("lamp", "sticks"): (DeviceError, "lamp: its shutter does not .*check its cable"),
     ("operator", "refuses"): (OperatorStop, "stopped at the prompt: Put"),
     ("operator", "leaves"): (OperatorStop, "standard input ended: nobody answers"),
     ("disk", "refuse_writes"): (StorageError, "record.sqlite: cannot be written.*look at the"),
@@ -138,7 +138,7 @@ def test_a_fault_in_a_state(
     else:
         faults.plan(device, fault, *sound.states[state])
     ended = scan(small, tmp_path / "run", faults, disk)
-    assert faults.moments.left == 0  # it did happen
+    assert faults.triggers.pending == 0  # it did happen
     require_right(ended, sound)
     set_right = state in SET_RIGHT.get((device, fault), ())
     if set_right or (device, fault) in RETRIED:
@@ -160,7 +160,7 @@ def require_right(ended: Ended, sound: Sound) -> None:
 def require_safe(faults: Faults, ended: Ended, device: str, fault: str) -> None:
     """Every axis was told to stop and the lamp to be dark, last of all; else somebody is told."""
     stops = ["theta_i.stop", "dphi.stop", "theta_r.stop", "lamp.darken"]
-    assert faults.moments.calls[-4:] == stops
+    assert faults.triggers.calls[-4:] == stops
     deaf = {"does not answer": "theta_r", "sticks": "lamp"}.get(fault)
     assert faults.scene is not None
     assert faults.scene.lit == (deaf == "lamp")
@@ -248,7 +248,7 @@ def test_two_devices_that_fail_together_are_both_told(
 ) -> None:
     text = "theta_i does not answer at camera.grab 20; camera is unplugged at camera.grab 20"
     ended = scan(small, tmp_path / "run", Faults(text))
-    require_named(ended, DeviceError, "camera: is gone", tmp_path / "run")
+    require_named(ended, DeviceError, "camera: not found", tmp_path / "run")
     assert "LOOK AT THE RIG FIRST: theta_i could not be made safe" in str(ended.error)
     require_right(ended, sound)
     require_goes_on(small, sound, tmp_path / "run")
@@ -261,10 +261,10 @@ def test_a_mistake_of_the_program_is_in_the_record(small: Loaded, tmp_path: Path
     def fail() -> None:
         raise ZeroDivisionError("a mistake")
 
-    faults.moments.plan("at", "camera.grab", 20, fail)
+    faults.triggers.plan("at", "camera.grab", 20, fail)
     with pytest.raises(ZeroDivisionError):
         scan(small, tmp_path / "run", faults)
-    assert faults.moments.calls[-1] == "lamp.darken"
+    assert faults.triggers.calls[-1] == "lamp.darken"
     with Record.open(tmp_path / "run") as record:
         (why,) = [text for _, kind, text in record.events() if kind == "fault"]
     assert why == "the program failed: ZeroDivisionError('a mistake')"
