@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 import platform
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-_PACKAGES = ("gonio", "numpy", "scipy", "opencv-contrib-python-headless")
+from acquisition.results.versions import LIBRARIES, versions_of
 
 
 def machine() -> dict[str, str]:
@@ -19,7 +18,7 @@ def machine() -> dict[str, str]:
         "system": f"{platform.system()} {platform.release()}, {platform.machine()}",
         "Python": platform.python_version(),
     }
-    found |= {package: _version(package) for package in _PACKAGES}
+    found |= versions_of("gonio", *LIBRARIES)
     return found | {"date": datetime.now(UTC).isoformat(timespec="seconds")}
 
 
@@ -31,10 +30,3 @@ def _processor() -> str:
         lines = []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return next(iter(names), "") or platform.processor() or "unknown"
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "unknown"

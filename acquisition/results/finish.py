@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from acquisition.results.fitting import fit_run
-from acquisition.results.reduction import Reduced, reduce
+from acquisition.results.measurements_csv import measurements_csv
+from acquisition.results.reduction import reduced_run
 from acquisition.results.report_inputs import report_data
 from acquisition.results.summary import budget, headline, notes, parameters_of
 from analysis.choice.fit_json import nothing, to_json
@@ -21,14 +18,8 @@ from analysis.report.data import Parameter
 from analysis.report.page import write_report
 from instrument.config.load import Loaded
 from instrument.errors import NotDetermined, StorageError
-from instrument.geometry import FloatArray
 from instrument.record.record import Record
 from instrument.text.atomic_file import write_whole
-
-COLUMNS = (
-    *("theta_i_deg", "theta_r_deg", "dphi_deg", "radiance", "u_radiance", "brdf", "u_brdf"),
-    *("window_pixels", "exposure_s", "frames", "flags", "time_utc"),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +38,7 @@ def finish(record: Record, loaded: Loaded) -> Outcome:
 
     Raises `NotDetermined` where nothing was measured, `StorageError` where the disk fails.
     """
-    reduced = reduce(record.readings(), loaded.protocol, record.checks())
+    reduced = reduced_run(record, loaded)
     if not reduced.points:
         raise NotDetermined(
             f"{record.folder}: no geometry has been measured yet: gonio resume {record.folder}"
@@ -62,7 +53,7 @@ def finish(record: Record, loaded: Loaded) -> Outcome:
         record.folder / "report.html",
     )
     with _kept(record.folder):
-        write_whole(record.folder / "measurements.csv", table(reduced, u_brdf))
+        write_whole(record.folder / "measurements.csv", measurements_csv(reduced, u_brdf))
         write_whole(record.folder / "fit.json", json.dumps(outcome.fit, indent=2, allow_nan=False))
     words = (outcome.headline, outcome.notes)
     shown = report_data(reduced, fitted, budget(reduced, u_brdf), words, record, loaded)
@@ -79,23 +70,3 @@ def _kept(run: Path) -> Iterator[None]:
     except StorageError as error:
         text = f"{error}. Nothing measured is lost; then: gonio report {run}"
         raise StorageError(text) from error
-
-
-def table(reduced: Reduced, u_brdf: FloatArray) -> str:
-    """measurements.csv: one row a point; behind the promised columns, each part of its u."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    parts = [f"u_{name.replace(' ', '_')}_relative" for name in reduced.parts]
-    writer.writerow([*COLUMNS, *parts])
-    for n, p in enumerate(reduced.points):
-        values = (reduced.radiance[n], reduced.u_radiance[n], reduced.brdf[n], u_brdf[n])
-        writer.writerow(
-            [p.theta_i_deg, p.theta_r_deg, p.dphi_deg, *map(_cell, values)]
-            + [f"{p.window_pixels:.2f}", p.exposure_s, p.frames, reduced.flags[n], p.time_utc]
-            + [_cell(float(u[n])) for u in reduced.parts.values()]
-        )
-    return text.getvalue()
-
-
-def _cell(value: float) -> str:
-    return f"{value:.9g}" if np.isfinite(value) else ""

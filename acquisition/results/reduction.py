@@ -14,9 +14,11 @@ import numpy as np
 
 from acquisition.measure.drift import Drift, rate
 from analysis.data.measurements import SharedError
+from instrument.config.load import Loaded
 from instrument.config.protocol import Protocol
 from instrument.geometry import BoolArray, FloatArray
 from instrument.record.reading import Check, Reading
+from instrument.record.record import Record
 
 NOISE, ROUNDING, DRIFT = "photon and read noise", "rounding to counts", "lamp drift"
 DARK, PLACEMENT, TEXTURE = "dark frames", "sample placement", "texture at the window edge"
@@ -86,10 +88,13 @@ def root_sum_square(parts: Sequence[FloatArray]) -> FloatArray:
     return total
 
 
-def reduce(
-    readings: Sequence[Reading], protocol: Protocol, checks: Sequence[Check] = ()
-) -> Reduced:
-    """Work out radiance and BRDF of all points of a run; `checks` are those made at a resume."""
+def reduced_run(record: Record, loaded: Loaded) -> Reduced:
+    """Return radiance and BRDF of all points in a run's record, complete or not."""
+    return reduce(record.readings(), loaded.protocol, record.checks())
+
+
+def reduce(readings: Sequence[Reading], protocol: Protocol, checks: Sequence[Check]) -> Reduced:
+    """Return radiance and BRDF of all points; `checks`: the lamp checks made at each resume."""
     points = tuple(r for r in readings if r.kind == "point")
     blocks = sorted({r.block for r in readings})
     drifts = {block: Drift.of(readings, block, checks) for block in blocks}

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
-
 import numpy as np
 
 from acquisition.results.fitting import Fitted
 from acquisition.results.reduction import Reduced
 from acquisition.results.summary import Budget, parameters_of
+from acquisition.results.versions import LIBRARIES, versions_of
 from analysis.fit.fit import FitResult
 from analysis.report.data import Candidate, Curve, ReportData
 from instrument.config.axes import AXES
@@ -106,9 +105,8 @@ def _rig_rows(rig: Rig) -> Rows:
 
 
 def _version_rows(record: Record) -> Rows:
-    packages = ("gonio", "numpy", "scipy", "opencv-contrib-python-headless", "matplotlib")
     scanned = ("gonio, when scanned", record.meta("program_version") or "unknown")
-    return (scanned, *((name, version(name)) for name in packages))
+    return (scanned, *versions_of("gonio", *LIBRARIES, "matplotlib").items())
 
 
 def _time_rows(record: Record) -> Rows:

@@ -45,7 +45,7 @@ def measured(loaded: Loaded, folder: Path) -> tuple[Reduced, Fitted, tuple[str, 
         Engine(loaded.protocol, loaded.rig, open_devices(loaded), record, ignored.append).run(
             make_plan(loaded)
         )
-        reduced = reduce(record.readings(), loaded.protocol)
+        reduced = reduce(record.readings(), loaded.protocol, ())
         fitted = fit_run(reduced, loaded)
         return reduced, fitted, notes(reduced, fitted, record, loaded)
 

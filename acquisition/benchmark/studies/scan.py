@@ -25,7 +25,7 @@ from acquisition.measure.window import window_at
 from acquisition.plan.exposure_ladder import longest_below
 from acquisition.plan.plan import Plan, Step, make_plan
 from acquisition.results.fitting import measurements
-from acquisition.results.reduction import reduce
+from acquisition.results.reduction import reduced_run
 from acquisition.rig import open_devices
 from analysis.data.acceptance import Acceptance
 from analysis.data.covariance import Covariance
@@ -162,7 +162,7 @@ def _once(loaded: Loaded, folder: Path) -> tuple[dict[str, float], dict[str, flo
         with Record.create(folder, {}) as record:
             engine = Engine(loaded.protocol, loaded.rig, devices, record, _nothing)
             engine.run(make_plan(loaded))
-            reduced = reduce(record.readings(), loaded.protocol)
+            reduced = reduced_run(record, loaded)
     finally:
         devices.close()
     points = measurements(reduced, loaded)

@@ -261,7 +261,7 @@ def test_drift_is_followed_and_taken_out(small: Loaded, tmp_path: Path) -> None:
         loaded = changed(small, rig={"simulation": simulation})
         with Record.create(tmp_path / str(drift), {}) as record:
             run(loaded, record)
-            brdf.append(reduce(record.readings(), loaded.protocol).brdf)
+            brdf.append(reduce(record.readings(), loaded.protocol, ()).brdf)
     assert brdf[1] == pytest.approx(brdf[0], rel=2e-3)
     # Not corrected, sample and tile differ by what the lamp did between them.
     raw = _reduced_without_checks(small, tmp_path / "0.9")
@@ -271,7 +271,7 @@ def test_drift_is_followed_and_taken_out(small: Loaded, tmp_path: Path) -> None:
 def _reduced_without_checks(loaded: Loaded, folder: Path) -> np.ndarray:
     with Record.open(folder) as record:
         readings = [r for r in record.readings() if r.kind != "drift"]
-        return reduce(readings, loaded.protocol).brdf
+        return reduce(readings, loaded.protocol, ()).brdf
 
 
 def test_what_was_exposed_is_accepted_before_the_operator_is_asked(
@@ -297,7 +297,7 @@ def test_a_scan_cut_at_any_step_can_be_reduced(small: Loaded, record: Record) ->
     run(small, record)
     readings = record.readings()
     for count in range(len(readings) + 1):
-        reduced = reduce(readings[:count], small.protocol)
+        reduced = reduce(readings[:count], small.protocol, ())
         assert len(reduced.flags) == len(reduced.points)
         assert np.all(np.isfinite(reduced.brdf[reduced.sound]))
 

@@ -120,8 +120,8 @@ def test_a_lamp_that_has_jumped_is_counted_from_there_on(
         )
         assert any("the lamp has jumped" in text for _, _, text in record.events())
         brdf = reduce(record.readings(), small.protocol, record.checks()).brdf
-        uncorrected = reduce(record.readings(), small.protocol).brdf
-    uninterrupted = reduce(whole, small.protocol).brdf
+        uncorrected = reduce(record.readings(), small.protocol, ()).brdf
+    uninterrupted = reduce(whole, small.protocol, ()).brdf
     assert brdf == pytest.approx(uninterrupted, rel=3e-3)
     assert max(abs(uncorrected / uninterrupted - 1)) > 0.02
 
@@ -138,7 +138,7 @@ def test_a_check_that_found_the_lamp_as_it_was_changes_nothing(
             4 * check.u_expected
         )
         with_checks = reduce(record.readings(), small.protocol, record.checks())
-        without = reduce(record.readings(), small.protocol)
+        without = reduce(record.readings(), small.protocol, ())
         assert with_checks.brdf.tolist() == without.brdf.tolist()
         assert any("as before" in text for _, kind, text in record.events() if kind == "drift")
 

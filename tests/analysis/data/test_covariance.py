@@ -82,7 +82,7 @@ def test_without_usable_checks_there_is_no_drift_noise(
     small: Loaded, resumed: tuple[list[Reading], list[Check]]
 ) -> None:
     readings = [replace(r, flags="saturated") if r.kind == "drift" else r for r in resumed[0]]
-    assert DRIFT not in reduce(readings, small.protocol).parts
+    assert DRIFT not in reduce(readings, small.protocol, ()).parts
 
 
 def test_levels_are_those_of_the_checks(resumed: tuple[list[Reading], list[Check]]) -> None:

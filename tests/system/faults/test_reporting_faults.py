@@ -57,7 +57,7 @@ def as_it_was(folder: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize("too_large", RESULTS)
 def test_a_result_that_the_disk_does_not_take(complete: Path, too_large: str) -> None:
     """There is room for all that is smaller: those are whole, the first that is not is named."""
-    from acquisition.commands.scan import load_run_inputs
+    from acquisition.results.run_folder import load_run_inputs
 
     before = as_it_was(complete)
     room = len(before[too_large]) - 1

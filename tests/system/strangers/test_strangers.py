@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from pydantic import TypeAdapter
 
-from acquisition.commands.scan import _default_folder
+from acquisition.results.run_folder import default_folder
 from acquisition.terminal.console import EscapingConsole
 from analysis.data.csv_table import read_csv
 from analysis.report.data import ReportData
@@ -198,7 +198,7 @@ def test_a_name_has_one_line(tmp_path: Path) -> None:
 def test_a_name_leads_to_no_other_folder(tmp_path: Path) -> None:
     """A run's folder is called after the protocol's file, whatever stands in it."""
     loaded = protocol(tmp_path, "name: foam\n", "name: ../../../x/\n")
-    folder = _default_folder(loaded)
+    folder = default_folder(loaded)
     assert folder.parent == Path("runs")
     assert folder.name.startswith("p-")
 

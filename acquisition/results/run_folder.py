@@ -1,0 +1,82 @@
+"""Folder of a run: its name, its copies of protocol and rig, and the data that identify the run.
+
+The record keeps both texts and their SHA-256. The copies are for people and for `load_run_inputs`,
+which refuses a copy that was edited: readings before and after the edit would not belong together.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from datetime import UTC, datetime
+from pathlib import Path
+
+from acquisition.plan.plan import Plan
+from acquisition.results.model_check import check_model
+from acquisition.results.versions import LIBRARIES, versions_of
+from instrument.config.load import Loaded, load_protocol
+from instrument.errors import InputError, StorageError
+from instrument.record.record import Record
+from instrument.text.atomic_file import write_whole
+
+PROTOCOL_FILE, RIG_FILE = "protocol.yaml", "rig.yaml"
+_FILES = {"protocol": PROTOCOL_FILE, "rig": RIG_FILE}  # by the record's key of the text
+
+
+def default_folder(loaded: Loaded) -> Path:
+    """Return `runs/NAME-DATE-TIME`, with the protocol file's name and the time in UTC."""
+    now = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
+    return Path("runs") / f"{loaded.protocol_path.stem}-{now}"
+
+
+def run_meta(loaded: Loaded, plan: Plan) -> dict[str, str]:
+    """Return what the record keeps about a new run: inputs, versions, start and planned length."""
+    ran_on = {"python": platform.python_version(), "system": platform.platform()}
+    return {
+        "protocol_file": str(loaded.protocol_path),
+        "rig_file": str(loaded.rig_path),
+        "protocol": loaded.protocol_text,
+        "rig": loaded.rig_text,
+        "protocol_sha256": _digest(loaded.protocol_text),
+        "rig_sha256": _digest(loaded.rig_text),
+        "program_version": versions_of("gonio")["gonio"],
+        "versions": json.dumps(ran_on | versions_of(*LIBRARIES)),
+        "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "planned_s": f"{plan.duration_s:.1f}",
+        "hidden": str(len(plan.hidden)),
+        "steps": str(len(plan.steps)),
+    }
+
+
+def write_run_inputs(record: Record) -> None:
+    """Write the run's copies of protocol and rig where they are missing.
+
+    A process that was killed early may have left a record without them. Raises `StorageError`.
+    """
+    for key, name in _FILES.items():
+        text, path = record.meta(key), record.folder / name
+        if text is None or path.exists():
+            continue
+        try:
+            write_whole(path, text)
+        except StorageError as error:
+            raise StorageError(f"{error}, then: gonio resume {record.folder}") from error
+
+
+def load_run_inputs(record: Record) -> Loaded:
+    """Load the run's copies of protocol and rig; raises `InputError` if one was changed."""
+    folder = record.folder
+    loaded = load_protocol(folder / PROTOCOL_FILE, folder / RIG_FILE, check_model=check_model)
+    texts = {"protocol": loaded.protocol_text, "rig": loaded.rig_text}
+    for key, name in _FILES.items():
+        if record.meta(f"{key}_sha256") != _digest(texts[key]):
+            raise InputError(
+                f"{folder / name}: changed since the run began, so its readings would not belong "
+                "together: restore the file, or start a new run"
+            )
+    return loaded
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
