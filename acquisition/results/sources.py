@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.results.fitting import measurements
-from acquisition.results.reduction import reduce
+from acquisition.results.reduction import reduced_run
 from acquisition.results.run_folder import load_run_inputs
 from analysis.data.acceptance import Acceptance
 from analysis.data.csv_table import read_csv
@@ -87,7 +87,7 @@ def _kind(path: Path) -> str:
 def _run(path: Path) -> Source:
     with Record.open(path) as record:
         loaded = load_run_inputs(record)
-        reduced = reduce(record.readings(), loaded.protocol, ())
+        reduced = reduced_run(record, loaded)
     if not np.any(reduced.sound):
         raise NotDetermined(f"{path}: no geometry has been measured yet that could be fitted")
     flagged = int(np.sum(~reduced.sound))

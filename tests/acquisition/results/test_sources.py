@@ -1,0 +1,57 @@
+"""Sources of `gonio fit`: runs, tables and databases."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from acquisition.engine.engine import Engine
+from acquisition.engine.resume import Progress
+from acquisition.plan.plan import Step, make_plan
+from acquisition.results.reduction import reduced_run
+from acquisition.results.run_folder import load_run_inputs, run_meta, write_run_inputs
+from acquisition.results.sources import Wanted, read_source
+from acquisition.rig import open_devices
+from instrument.config.load import Loaded, load_protocol
+from instrument.record.record import Record
+from tests.support.scans import changed, small_demo
+
+
+class StoppedError(Exception):
+    """Ends a scan after a step."""
+
+
+@pytest.fixture(scope="module")
+def resumed_with_a_darker_lamp(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run's folder; the lamp lost 20 % of its light while the scan was interrupted."""
+    folder = tmp_path_factory.mktemp("jump")
+    loaded = load_protocol(small_demo(folder))
+    white = loaded.rig.lamp.white_electrons_per_s
+    lamp = loaded.rig.lamp.model_copy(update={"white_electrons_per_s": 0.8 * white})
+    plan = make_plan(loaded)
+
+    def stop(step: Step) -> None:
+        if step.index == 12:
+            raise StoppedError
+
+    def measure(rig: Loaded, progress: Progress | None) -> None:
+        devices = open_devices(rig)
+        Engine(rig.protocol, rig.rig, devices, record, stop).run(plan, progress)
+
+    with Record.create(folder / "run", run_meta(loaded, plan)) as record:
+        write_run_inputs(record)
+        with pytest.raises(StoppedError):
+            measure(loaded, None)
+        so_far = Progress(tuple(record.readings()), tuple(record.checks()))
+        measure(changed(loaded, rig={"lamp": lamp}), so_far)
+        assert [check.jumped for check in record.checks()] == [True]
+    return folder / "run"
+
+
+def test_a_run_is_fitted_with_the_lamp_s_jumps_taken_out(resumed_with_a_darker_lamp: Path) -> None:
+    folder = resumed_with_a_darker_lamp
+    source = read_source(folder, Wanted())
+    with Record.open(folder) as record:
+        reduced = reduced_run(record, load_run_inputs(record))
+    assert source.measurements.brdf.tolist() == reduced.brdf[reduced.sound].tolist()
