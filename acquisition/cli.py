@@ -1,25 +1,29 @@
-"""The command line, `gonio`. Heavy imports wait until a command needs them."""
+"""Command line of the program, `gonio`: arguments, help texts, errors as exit codes.
+
+Each command imports its module when it is called, so that `gonio --help` loads nothing heavy.
+"""
 
 from __future__ import annotations
 
-import importlib
 import math
 import os
 import signal
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
 from instrument.errors import GonioError, OperatorStop, StorageError
 from instrument.text.terminal_safe import escape_control_characters
 
-# The program's arrays are small: threads of the linear algebra would only wait for one another.
+# The program's arrays are small: several threads in linear algebra would only cost time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-STOPPING_S = 2.0  # that stopping all devices may take
+STOPPING_S = 2.0  # time allowed for stopping all devices
 
 app = typer.Typer(
     help="Measure how a flat sample reflects light, and find the simplest model that explains it.",
@@ -36,10 +40,12 @@ RigFile = Annotated[
 RunFolder = Annotated[Path, typer.Argument(help="The folder of a run.")]
 OutFolder = Annotated[
     Path | None,
-    typer.Option("--out", help="The run's folder, absent or empty. Default: runs/NAME-DATE-TIME."),
+    typer.Option(
+        "--out", help="Folder for the run, absent or empty. Default: runs/NAME-DATE-TIME."
+    ),
 ]
 Json = Annotated[
-    bool, typer.Option("--json", help="Print the result as JSON, and nothing else, on stdout.")
+    bool, typer.Option("--json", help="Print only the result, as JSON, on standard output.")
 ]
 
 
@@ -47,26 +53,35 @@ Json = Annotated[
 def run(
     protocol: ProtocolFile, rig: RigFile = None, out: OutFolder = None, json: Json = False
 ) -> None:
-    """Run a scan from a protocol: measure, fit, report."""
-    _do("run_protocol", protocol, rig, out, json)
+    """Run a scan from a protocol: measure, fit and report."""
+    with errors_as_exit_codes():
+        from acquisition.commands.scan import run_protocol
+
+        run_protocol(protocol, rig, out, as_json=json)
 
 
 @app.command()
 def plan(protocol: ProtocolFile, rig: RigFile = None, json: Json = False) -> None:
-    """Show what a scan would do and how long it takes; no device is touched."""
-    _do("show_plan", protocol, rig, json)
+    """Show the geometries and the duration of a scan; opens no device."""
+    with errors_as_exit_codes():
+        from acquisition.commands.scan import show_plan
+
+        show_plan(protocol, rig, as_json=json)
 
 
 @app.command()
 def resume(
     folder: RunFolder,
     yes: Annotated[
-        bool, typer.Option("--yes", help="The rig is ready to move: do not ask.")
+        bool, typer.Option("--yes", help="The rig is clear and may move: do not ask.")
     ] = False,
     json: Json = False,
 ) -> None:
-    """Go on with a run that was stopped, at the first geometry that is not in its record."""
-    _do("resume_run", folder, yes, json)
+    """Resume a stopped run at the first geometry that is missing in its record."""
+    with errors_as_exit_codes():
+        from acquisition.commands.scan import resume_run
+
+        resume_run(folder, yes=yes, as_json=json)
 
 
 @app.command()
@@ -74,112 +89,148 @@ def fit(
     source: Annotated[Path, typer.Argument(help="A run's folder, or a CSV table.")],
     models: Annotated[
         str | None,
-        typer.Option(help="Candidates, parted by commas. Default: the ladder from Lambert up."),
+        typer.Option(help="Candidate models, separated by commas. Default: the whole ladder."),
     ] = None,
     max_theta_deg: Annotated[
-        float, typer.Option(help="Leave out points with a larger theta_i or theta_r.")
+        float, typer.Option(help="Leave out points with a larger theta_i or theta_r (degrees).")
     ] = 90.0,
     format: Annotated[
-        str, typer.Option(help="run, csv or curet; auto: a run's folder, else a CSV.")
+        str, typer.Option(help="run, csv or curet; auto: a run if SOURCE is a folder, else csv.")
     ] = "auto",
-    sample: Annotated[int | None, typer.Option(help="Which material of a curet folder.")] = None,
+    sample: Annotated[int | None, typer.Option(help="Number of the material, for curet.")] = None,
     robust: Annotated[
-        bool, typer.Option("--robust", help="Outliers count less, and are named.")
+        bool, typer.Option("--robust", help="Give outliers less weight, and list them.")
     ] = False,
     relative: Annotated[
-        bool, typer.Option("--relative", help="The values are tied to no reference.")
+        bool,
+        typer.Option("--relative", help="The values are relative: no reference fixes their scale."),
     ] = False,
     method: Annotated[
         str,
-        typer.Option(help="For rough surfaces: auto, qualitative, functional or exact."),
+        typer.Option(help="Method for rough surfaces: auto, qualitative, functional or exact."),
     ] = "auto",
     json: Json = False,
 ) -> None:
     """Find the simplest model that explains a run or a CSV table of BRDF.
 
-    A CSV has the columns theta_i_deg, theta_r_deg, dphi_deg, brdf and, where it is known, u_brdf.
-    Ends with 0 whether a model is adequate or none is, with 5 where the data do not determine the
+    A CSV table has the columns theta_i_deg, theta_r_deg, dphi_deg, brdf and, if known, u_brdf.
+    Exits with 0 whether or not a model is adequate, with 5 if the data do not determine the
     parameters.
     """
-    wanted = (format, sample, max_theta_deg, relative)
-    asked = (source, models, robust, json, method, *wanted)
-    _do("fit_source", *asked, module="acquisition.commands.fit")
+    with errors_as_exit_codes():
+        from acquisition.commands.fit import fit_source
+        from acquisition.results.sources import Wanted
+
+        wanted = Wanted(
+            format=format, sample=sample, max_theta_deg=max_theta_deg, relative=relative
+        )
+        fit_source(source, wanted, models=models, robust=robust, method=method, as_json=json)
 
 
 @app.command()
 def report(folder: RunFolder, json: Json = False) -> None:
-    """Fit a finished run again and write its tables and its report anew."""
-    _do("report_run", folder, json)
+    """Fit a run again and rewrite its table and its report."""
+    with errors_as_exit_codes():
+        from acquisition.commands.scan import report_run
+
+        report_run(folder, as_json=json)
 
 
 RigOnly = Annotated[Path | None, typer.Option("--rig", help="The rig file.")]
 Yes = Annotated[bool, typer.Option("--yes", help="The rig is clear and may move: do not ask.")]
 AxisName = Annotated[str, typer.Argument(help="theta_i, dphi or theta_r.")]
-_BENCH = "acquisition.commands.setup"
 
 
 @app.command()
 def devices(
     rig: RigOnly = None,
     identify: Annotated[
-        bool, typer.Option("--identify", help="Ask every serial port who is there.")
+        bool, typer.Option("--identify", help="Query every serial port for known controllers.")
     ] = False,
 ) -> None:
-    """List serial ports and cameras; with --rig, open the rig's devices and say who answers.
+    """List serial ports and cameras; with --rig, open the rig's devices and identify them.
 
-    --identify sends each known controller's question to every port: not to ports of other machines.
+    --identify sends the query of every known controller to every port: do not use it while other
+    machines are connected.
     """
-    _do("list_devices", rig, identify, module=_BENCH)
+    with errors_as_exit_codes():
+        from acquisition.commands.setup import list_devices
+
+        list_devices(rig, identify=identify)
 
 
 @app.command()
 def home(axis: AxisName, rig: RigOnly = None, yes: Yes = False) -> None:
-    """Have an axis look for its reference. It moves."""
-    _do("home_axis", axis, rig, yes, module=_BENCH)
+    """Home an axis: it moves until it has found its reference."""
+    with errors_as_exit_codes():
+        from acquisition.commands.setup import home_axis
+
+        home_axis(axis, rig, yes=yes)
 
 
 @app.command(context_settings={"ignore_unknown_options": True})
 def move(
     axis: AxisName,
-    angle_deg: Annotated[float, typer.Argument(help="Where to, in the rig's degrees.")],
+    angle_deg: Annotated[float, typer.Argument(help="Target angle in degrees of the rig.")],
     rig: RigOnly = None,
     yes: Yes = False,
 ) -> None:
-    """Move one axis, after homing. Keep-out zones are not checked: only one axis is known."""
-    _do("move_axis", axis, angle_deg, rig, yes, module=_BENCH)
+    """Move one homed axis. Keep-out zones are not checked: the other axes are not read."""
+    with errors_as_exit_codes():
+        from acquisition.commands.setup import move_axis
+
+        move_axis(axis, angle_deg, rig, yes=yes)
 
 
 @app.command()
 def grab(
-    out: Annotated[Path, typer.Option("--out", "-o", help="A .png (drawn on) or .tiff (raw).")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", "-o", help="File: .png (8 bit, with the window) or .tiff (raw counts)."
+        ),
+    ],
     rig: RigOnly = None,
     protocol: Annotated[
         Path | None, typer.Option(help="Take rig and measuring window from this protocol.")
     ] = None,
     theta_r_deg: Annotated[
-        float, typer.Option(help="Where the camera stands, for the window's outline.")
+        float, typer.Option(help="View angle of the camera in degrees, for the outline.")
     ] = 0.0,
     exposure_s: Annotated[
         float | None, typer.Option(help="Exposure in seconds. Default: the camera's shortest.")
     ] = None,
     json: Json = False,
 ) -> None:
-    """Take one frame for aiming, with the measuring window drawn on it. Nothing moves."""
-    _do("grab_frame", rig, protocol, theta_r_deg, exposure_s, out, json, module=_BENCH)
+    """Take one frame with the measuring window drawn on it, for aiming. Nothing moves."""
+    with errors_as_exit_codes():
+        from acquisition.commands.setup import grab_frame
+
+        grab_frame(
+            out,
+            rig_path=rig,
+            protocol_path=protocol,
+            theta_r_deg=theta_r_deg,
+            exposure_s=exposure_s,
+            as_json=json,
+        )
 
 
 @app.command()
 def bench(
-    out: Annotated[Path, typer.Option("--out", help="The folder to write, absent or empty.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder for the results, absent or empty.")],
     quick: Annotated[
-        bool, typer.Option("--quick", help="A minute instead of a quarter of an hour.")
+        bool, typer.Option("--quick", help="Take a minute instead of a quarter of an hour.")
     ] = False,
     maps: Annotated[
-        bool, typer.Option("--maps", help="Also map where methods fail; takes longer.")
+        bool, typer.Option("--maps", help="Also map where each method fails; takes longer.")
     ] = False,
 ) -> None:
-    """Measure on this machine what accuracy costs, method by method, and chart it."""
-    _do("run_bench", out, quick, maps, module="acquisition.benchmark.command")
+    """Measure and chart speed against accuracy, for each method, on this machine."""
+    with errors_as_exit_codes():
+        from acquisition.benchmark.command import run_bench
+
+        run_bench(out, quick, maps)
 
 
 def main() -> None:
@@ -192,7 +243,7 @@ def main() -> None:
 
 
 def stop_on_signals() -> None:
-    """Let Ctrl-C and SIGTERM end what runs; a second one soon after must not cut the stop short."""
+    """Make Ctrl-C and SIGTERM end the command; a second one within STOPPING_S is ignored."""
     last_s = -math.inf
 
     def interrupt(number: int, frame: object) -> None:  # noqa: ARG001 - a signal handler's form
@@ -205,16 +256,19 @@ def stop_on_signals() -> None:
         signal.signal(number, interrupt)
 
 
-def _do(command: str, *arguments: object, module: str = "acquisition.commands.scan") -> None:
-    """Run a module's command; what can go wrong becomes a message and an exit code."""
+@contextmanager
+def errors_as_exit_codes() -> Iterator[None]:
+    """Print an expected error or a Ctrl-C on standard error and exit with its code."""
     try:
-        getattr(importlib.import_module(module), command)(*arguments)
+        yield
     except GonioError as error:
-        sys.stderr.write(f"{escape_control_characters(str(error))}\n")
-        raise typer.Exit(error.exit_code) from None
+        _exit(str(error), error.exit_code)
     except OSError as error:
-        sys.stderr.write(f"{escape_control_characters(str(error))}\n")
-        raise typer.Exit(StorageError.exit_code) from None
+        _exit(str(error), StorageError.exit_code)
     except KeyboardInterrupt:
-        sys.stderr.write("stopped by the operator\n")
-        raise typer.Exit(OperatorStop.exit_code) from None
+        _exit("stopped by the operator", OperatorStop.exit_code)
+
+
+def _exit(message: str, code: int) -> NoReturn:
+    sys.stderr.write(f"{escape_control_characters(message)}\n")
+    raise typer.Exit(code) from None

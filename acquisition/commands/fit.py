@@ -24,21 +24,23 @@ from instrument.errors import InputError, NotDetermined
 
 def fit_source(
     path: Path,
+    wanted: Wanted,
+    *,
     models: str | None,
     robust: bool,
-    as_json: bool,
     method: str,
-    *wanted: *tuple[str, int | None, float, bool],
+    as_json: bool,
 ) -> None:
-    """Fit what is `wanted` of a source (the fields of `Wanted`) and print the outcome.
+    """Fit the `wanted` part of a source and print the outcome.
 
-    `method`: for the rough surface, one of `analysis.choice.ladder.METHODS`.
-    Raises `InputError` for what is wrong with it, and `NotDetermined`, after printing, where the
-    data do not determine the chosen model's parameters, or are too few for any fit.
+    `models`: names separated by commas, None for the ladder. `method`: for rough surfaces, one of
+    `analysis.choice.ladder.METHODS`. Raises `InputError` for a wrong source or option, and
+    `NotDetermined`, after printing, where the data do not determine the parameters of the chosen
+    model or are too few for any fit.
     """
     names, way = _names(models), _method(method, models)
     try:
-        source = read_source(path, Wanted(*wanted))
+        source = read_source(path, wanted)
         choice = choose(source.measurements, source.acceptance, names, robust, way)
     except NotDetermined as error:
         if as_json:

@@ -70,11 +70,12 @@ def move_axis(axis: str, angle_deg: float, rig_path: Path | None, yes: bool) -> 
 
 
 def grab_frame(
+    path: Path,
+    *,
     rig_path: Path | None,
     protocol_path: Path | None,
     theta_r_deg: float,
     exposure_s: float | None,
-    path: Path,
     as_json: bool,
 ) -> None:
     """Take one frame, for aiming: the picture with the window drawn on it, and its statistics.
