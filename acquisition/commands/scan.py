@@ -1,18 +1,13 @@
-"""The commands that scan: what `gonio run`, `plan`, `resume` and `report` do."""
+"""Commands that scan or use a scan's record: `gonio run`, `plan`, `resume` and `report`."""
 
 from __future__ import annotations
 
-import hashlib
 import json
-import platform
 import sys
-from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 
-from acquisition.afterwards import Afterwards
 from acquisition.commands.scan_session import scan
 from acquisition.commands.views import print_outcome, print_plan
 from acquisition.engine.frame_files import require_room
@@ -20,42 +15,52 @@ from acquisition.engine.resume import Progress
 from acquisition.plan.moves import home_pose, moves_between
 from acquisition.plan.plan import Plan, make_plan
 from acquisition.results.model_check import check_model
+from acquisition.results.run_folder import (
+    default_folder,
+    load_run_inputs,
+    run_meta,
+    write_run_inputs,
+)
 from acquisition.rig import prepare
 from acquisition.terminal.operator import require_yes
 from instrument.config.load import Loaded, load_protocol
-from instrument.errors import InputError, StorageError
+from instrument.errors import OperatorStop
 from instrument.record.record import Record
-from instrument.text.atomic_file import write_whole
-
-PROTOCOL_FILE, RIG_FILE = "protocol.yaml", "rig.yaml"
 
 
 def run_protocol(
     protocol_path: Path, rig_path: Path | None, out: Path | None, as_json: bool
 ) -> None:
-    """Plan, scan, fit, report. Raises `InputError` before anything moves, or what the scan met."""
+    """Plan, scan, fit and report.
+
+    Raises `InputError` before anything moves; `DeviceError`, `StorageError` or `OperatorStop` where
+    the scan ends early.
+    """
     loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
     plan = make_plan(loaded)
     prepare(loaded)
-    folder = out if out is not None else _default_folder(loaded)
+    folder = out if out is not None else default_folder(loaded)
     require_room(plan, loaded, folder)
-    with Record.create(folder, _meta(loaded, plan)) as record, record.claimed():
-        _write_inputs(record)
-        with Afterwards(folder, as_json) as afterwards:
-            scan(loaded, plan, record)
-            afterwards.finish()
+    with Record.create(folder, run_meta(loaded, plan)) as record, record.claimed():
+        write_run_inputs(record)
+        scan(loaded, plan, record)
+        _finish(record, loaded, as_json)
 
 
 def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
-    """Go on with a stopped run; a finished one is fitted and reported again."""
+    """Measure what is missing of a stopped run, then fit and report; a complete run is only fitted.
+
+    `yes`: the rig may move, without asking the operator.
+    """
     with Record.open(folder) as record:
-        _write_inputs(record)
+        write_run_inputs(record)
         loaded = load_run_inputs(record)
         plan = make_plan(loaded)
         so_far = Progress(tuple(record.readings()), tuple(record.checks()))
         missing = so_far.missing(plan)
         if missing:
-            moves_between(home_pose(loaded.rig), missing[0].pose, loaded.rig)  # or nothing moves
+            # Raises, before anything moves, where no way leads to the first missing pose.
+            moves_between(home_pose(loaded.rig), missing[0].pose, loaded.rig)
             prepare(loaded)
             with record.claimed():
                 _confirm(yes, len(missing), record)
@@ -64,13 +69,13 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
 
 
 def report_run(folder: Path, as_json: bool) -> None:
-    """Fit a run again and write its tables and report anew; touches no device."""
+    """Fit a run again and write its table and report anew; opens no device."""
     with Record.open(folder) as record:
         _finish(record, load_run_inputs(record), as_json)
 
 
 def show_plan(protocol_path: Path, rig_path: Path | None, as_json: bool) -> None:
-    """Print what a scan would do; touches no device."""
+    """Print the plan of a scan; opens no device."""
     loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
     plan = make_plan(loaded)
     if as_json:
@@ -91,76 +96,25 @@ def _plan_json(plan: Plan) -> dict[str, object]:
 
 
 def _finish(record: Record, loaded: Loaded, as_json: bool) -> None:
-    """Reduce, fit, report and say what came out."""
-    from acquisition.results.finish import finish
+    """Fit, report and print the outcome. The scan is over: a Ctrl-C costs no reading."""
+    try:
+        from acquisition.results.finish import finish  # heavy: only after a scan
 
-    outcome = finish(record, loaded)
+        outcome = finish(record, loaded)
+    except KeyboardInterrupt:
+        raise OperatorStop(
+            f"stopped by the operator before the report was written. Nothing measured is lost: "
+            f"{len(record.readings())} readings are safe in {record.folder}. Fit and report them "
+            f"with: gonio report {record.folder}"
+        ) from None
     if as_json:
         sys.stdout.write(json.dumps(outcome.fit, allow_nan=False) + "\n")
     else:
         print_outcome(outcome)
 
 
-def _default_folder(loaded: Loaded) -> Path:
-    now = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
-    return Path("runs") / f"{loaded.protocol_path.stem}-{now}"
-
-
-def _meta(loaded: Loaded, plan: Plan) -> Mapping[str, str]:
-    return {
-        "protocol_file": str(loaded.protocol_path),
-        "rig_file": str(loaded.rig_path),
-        "protocol": loaded.protocol_text,
-        "rig": loaded.rig_text,
-        "protocol_sha256": _digest(loaded.protocol_text),
-        "rig_sha256": _digest(loaded.rig_text),
-        "program_version": version("gonio"),
-        "versions": json.dumps(_versions()),
-        "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
-        "planned_s": f"{plan.duration_s:.1f}",
-        "hidden": str(len(plan.hidden)),
-        "steps": str(len(plan.steps)),
-    }
-
-
-def _versions() -> dict[str, str]:
-    """What the program ran on; older and newer libraries may round otherwise."""
-    libraries = ("numpy", "scipy", "opencv-contrib-python-headless")
-    found = {name: version(name) for name in libraries}
-    return {"python": platform.python_version(), "system": platform.platform(), **found}
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def load_run_inputs(record: Record) -> Loaded:
-    """The run's own copies of protocol and rig; `InputError` when they are not as they were."""
-    folder = record.folder
-    loaded = load_protocol(folder / PROTOCOL_FILE, folder / RIG_FILE, check_model=check_model)
-    for key, text in (("protocol", loaded.protocol_text), ("rig", loaded.rig_text)):
-        if record.meta(f"{key}_sha256") != _digest(text):
-            raise InputError(
-                f"{folder / (key + '.yaml')}: changed since the run began, so its readings "
-                "would not belong together: restore it, or start a new run"
-            )
-    return loaded
-
-
-def _write_inputs(record: Record) -> None:
-    """The run's own copies of protocol and rig; a process may have died before it wrote them."""
-    for key, name in (("protocol", PROTOCOL_FILE), ("rig", RIG_FILE)):
-        text, path = record.meta(key), record.folder / name
-        if text is None or path.exists():
-            continue
-        try:
-            write_whole(path, text)
-        except StorageError as error:
-            raise StorageError(f"{error}, then: gonio resume {record.folder}") from error
-
-
 def _confirm(yes: bool, steps: int, record: Record) -> None:
-    """Nothing moves again until the operator has said so; who said it is in the record."""
+    """Ask whether the rig may move, unless `yes` says so; record who answered."""
     ends = [(kind, why) for _, kind, why in record.events() if kind in ("fault", "stopped")]
     if not yes:
         last = f"The scan ended with: {ends[-1][1]}\n" if ends else ""
