@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Lines(Closing):
-    """The open ports, each once; use it with `with`."""
+    """The open ports, each opened once and shared; use it in a `with` statement."""
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
@@ -32,30 +32,30 @@ class Lines(Closing):
         self._closing = ExitStack()
 
     def close(self) -> None:
-        """Let go of all of it; safe twice."""
+        """Close all ports; safe to call twice."""
         self._closing.close()
 
     def serial(self, who: str, port: str, baudrate: int, xonxoff: bool = False) -> Line:
-        """The line of a serial port, opened for whoever asks first."""
+        """Return the line of a serial port; the first call opens it."""
         if port not in self._serial:
-            line = Line(who, port, baudrate, xonxoff)
+            line = Line(who, port, baudrate, self.clock, xonxoff)
             self._closing.callback(line.close)
             self._serial[port] = line
         return self._serial[port]
 
     def modbus(self, who: str, settings: BusSettings) -> ModbusBus:
-        """The bus of a Modbus port, opened for whoever asks first."""
+        """Return the bus of a Modbus port; the first call opens it."""
         from drivers.lines.modbus_bus import ModbusBus
 
         if settings.port not in self._modbus:
-            bus = ModbusBus(who, settings)
+            bus = ModbusBus(who, settings, self.clock)
             self._closing.callback(bus.close)
             self._modbus[settings.port] = bus
         return self._modbus[settings.port]
 
 
 def open_stage(name: str, axis: Wired, port: str, lines: Lines) -> MotorStage:
-    """The stage of an axis. Raises `DeviceError` where another device or none answers."""
+    """Open the stage of an axis; raise `DeviceError` if no device or another one answers."""
     match axis:
         case NewportAxis():
             return _newport(name, axis, port, lines)
@@ -87,7 +87,12 @@ def _oriental(name: str, axis: OrientalAxis, port: str, lines: Lines) -> MotorSt
     from drivers.stages.oriental import OrientalSettings, OrientalStage
 
     settings = OrientalSettings(
-        port, axis.steps_per_deg, _limits(axis), axis.baudrate, axis.parity, axis.unit
+        port=port,
+        steps_per_deg=axis.steps_per_deg,
+        limits=_limits(axis),
+        baudrate=axis.baudrate,
+        parity=axis.parity,
+        unit=axis.unit,
     )
     return OrientalStage(name, settings, lines.clock, lines.modbus(name, settings.bus))
 
@@ -95,31 +100,31 @@ def _oriental(name: str, axis: OrientalAxis, port: str, lines: Lines) -> MotorSt
 def _limits(axis: Wired) -> Limits:
     low, high = axis.device_limits_deg()
     return Limits(
-        low,
-        high,
-        axis.speed_deg_per_s,
-        axis.acceleration_deg_per_s2,
-        axis.tolerance_deg,
-        axis.homing_s,
-        axis.to_device_deg(axis.home_deg),
+        min_deg=low,
+        max_deg=high,
+        speed_deg_per_s=axis.speed_deg_per_s,
+        acceleration_deg_per_s2=axis.acceleration_deg_per_s2,
+        tolerance_deg=axis.tolerance_deg,
+        homing_s=axis.homing_s,
+        home_deg=axis.to_device_deg(axis.home_deg),
     )
 
 
 def open_camera(camera: V4l2CameraConfig, device: str, clock: Clock) -> Camera:
-    """The camera. Raises `DeviceError` where it cannot do what the rig file asks for."""
-    from drivers.v4l2.camera import V4l2Camera as Driver
-    from drivers.v4l2.camera import V4l2Settings
+    """Open the camera; raise `DeviceError` if it cannot do what the rig file asks for."""
+    from drivers.v4l2.camera import V4l2Camera
+    from drivers.v4l2.settings import V4l2Settings
 
     settings = V4l2Settings(
-        device,
-        camera.pixel_format,
-        camera.width_px,
-        camera.height_px,
-        camera.bit_depth,
-        camera.min_exposure_s,
-        camera.max_exposure_s,
-        camera.gain,
+        device=device,
+        pixel_format=camera.pixel_format,
+        width_px=camera.width_px,
+        height_px=camera.height_px,
+        bit_depth=camera.bit_depth,
+        min_exposure_s=camera.min_exposure_s,
+        max_exposure_s=camera.max_exposure_s,
+        gain=camera.gain,
         exposure_delay_frames=camera.exposure_delay_frames,
         frames_per_s=camera.frames_per_s,
     )
-    return Driver(settings, clock)
+    return V4l2Camera(settings, clock)

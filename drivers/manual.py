@@ -1,4 +1,4 @@
-"""What a person does in a motor's place: an axis that is set, a lamp that is covered, by hand."""
+"""Devices served by the operator: an axis set by hand, a lamp covered by hand."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from instrument.errors import DeviceError
 
 
 class HandSetAxis:
-    """A stage whose motor is the operator. Angles are those that the operator reads.
+    """Stage moved by the operator, who reads the angle from a scale.
 
-    `tolerance_deg`: how far from what was asked the operator may set it.
+    `words` describe the axis in the prompt. The angle set may differ from the one asked for by up
+    to `tolerance_deg`.
     """
 
     def __init__(self, name: str, words: str, operator: Operator, tolerance_deg: float) -> None:
@@ -20,29 +21,29 @@ class HandSetAxis:
         self._angle_deg: float | None = None
 
     def identity(self) -> str:
-        """Who moves this axis."""
+        """Return the axis's name and that it is set by hand."""
         return f"{self._name} set by hand"
 
     def home(self) -> None:
-        """Nothing to find: the operator reads the scale."""
+        """Do nothing: the operator reads the scale."""
 
     def homed(self) -> bool:
-        """A scale has no reference to lose."""
+        """Return True: a scale cannot lose its reference."""
         return True
 
     def settings(self) -> dict[str, str]:
-        """How exactly it is set."""
+        """Return the tolerance of a setting."""
         return {"tolerance_deg": f"{self._tolerance_deg:g}"}
 
     def start_move(self, angle_deg: float) -> None:
-        """Ask for the angle until the operator says that it is set, or stops."""
+        """Ask the operator to set an angle in degrees until the answer is within tolerance."""
         text = f"Set {self._words} ({self._name}) to {angle_deg:g} degrees"
         while True:
             request = Request("set axis", text, axis=self._name, angle_deg=angle_deg)
             answer = self._operator.ask(request)
-            said = _number(answer, angle_deg)
-            if said is not None and abs(said - angle_deg) <= self._tolerance_deg:
-                self._angle_deg = said
+            reported = _number(answer, angle_deg)
+            if reported is not None and abs(reported - angle_deg) <= self._tolerance_deg:
+                self._angle_deg = reported
                 return
             text = (
                 f"{answer!r} is not within {self._tolerance_deg:g} degrees of {angle_deg:g}: set "
@@ -50,28 +51,28 @@ class HandSetAxis:
             )
 
     def wait(self) -> float:
-        """The angle that the operator said was set, in degrees."""
+        """Return the angle reported by the operator, in degrees."""
         if self._angle_deg is None:
             raise DeviceError(f"{self._name} is set by hand and has not been set yet")
         return self._angle_deg
 
     def position_deg(self) -> float:
-        """The angle that the operator said was set, in degrees."""
+        """Return the angle reported by the operator, in degrees."""
         return self.wait()
 
     def limits_deg(self) -> tuple[float, float]:
-        """None of its own: the rig file's hold."""
+        """Return infinite limits: only the rig file's apply."""
         return -math.inf, math.inf
 
     def stop(self) -> None:
-        """A hand needs no stopping."""
+        """Do nothing: there is no motor to stop."""
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: nothing is open."""
 
 
 def _number(answer: str, otherwise: float) -> float | None:
-    """The angle of an answer; an empty one, or "done", means as asked."""
+    """Return the angle in an answer; an empty one, or "done", means as asked."""
     if answer.strip().lower() in ("", "done", "ok", "y", "yes"):
         return otherwise
     try:
@@ -81,19 +82,19 @@ def _number(answer: str, otherwise: float) -> float | None:
 
 
 class HandCoveredLamp:
-    """A lamp without a shutter: the operator covers it."""
+    """Lamp without a shutter, covered by the operator."""
 
     def __init__(self, operator: Operator) -> None:
         self._operator = operator
 
     def identity(self) -> str:
-        """Who darkens this lamp."""
+        """Return how this lamp is darkened."""
         return "lamp covered by hand"
 
     def darken(self) -> None:
-        """Ask to cover the lamp."""
+        """Ask the operator to cover the lamp."""
         self._operator.ask(Request("cover lamp", "Cover the lamp: dark frames are next"))
 
     def light(self) -> None:
-        """Ask to uncover the lamp."""
+        """Ask the operator to uncover the lamp."""
         self._operator.ask(Request("uncover lamp", "Uncover the lamp"))

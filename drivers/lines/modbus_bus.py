@@ -1,10 +1,10 @@
-"""A Modbus line: RTU over a serial port or Modbus TCP to a gateway, shared by several devices.
+"""Modbus line shared by several devices: RTU over a serial port, or Modbus TCP to a gateway.
 
-Modbus RTU does not number its requests: the answer to one may come late and be taken for the answer
-to the next. So after any lost or wrong answer the device is suspect: before anything else is asked,
-the line is left quiet for as long as an answer may take, and a block that is known to be there is
-read with a count of registers that nothing else on the line asks for. Nothing is resent here but
-what may safely be sent twice: reads, and a word that ends motion.
+Modbus RTU does not number its requests, so a late answer could be taken for the answer to the next
+request. After any lost or wrong answer the device counts as out of step. Before the next request
+the line is left quiet for as long as an answer may take. Then a block that is known to exist is
+read with a register count that no other request on this line uses. Only reads, and a word that
+ends motion, are ever sent twice.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from __future__ import annotations
 import logging
 import struct
 import termios
-import time
 from collections.abc import Callable, Sequence
 from itertools import cycle
 from typing import TYPE_CHECKING, TypeVar
@@ -22,6 +21,7 @@ from pymodbus.exceptions import ModbusException, ModbusIOException
 from drivers.lines.modbus_client import BusSettings, Client, client_for
 from drivers.lines.priority_lock import PriorityLock
 from drivers.lines.serial_line import Garbled, NoReply, PortGone
+from instrument.clock import Clock
 from instrument.closeable import Closing
 from instrument.errors import DeviceError
 
@@ -29,26 +29,24 @@ if TYPE_CHECKING:
     from pymodbus.pdu import ModbusPDU
 
 T = TypeVar("T")
-Lost = (NoReply, Garbled, PortGone)  # after these nobody knows what the device has done
+AnswerLost = (NoReply, Garbled, PortGone)  # the device may or may not have executed the request
 
 TRIES = 3
-GIVES_UP_S = 1.5  # no exchange begins later than this after the first: an error within 2 s
-MOST_LATE = 2  # earlier answers that may turn up one by one when the line is cleared
+GIVE_UP_S = 1.5  # no exchange begins later than this after the first: an error within 2 s
+MAX_LATE_ANSWERS = 2  # earlier answers that may arrive one by one while resynchronising
 SILENCE_S = 0.00175  # between frames, above 19200 baud (Modbus over serial line, 2.5.1.1)
-_SLICE_S = 0.02  # how long listening for quiet keeps the turn from a stop
-_DIALOUT = (
+_SLICE_S = 0.02  # listening for quiet delays a stop by no more than this
+_CHECK_PORT = (
     "look at the cable, at who else has the port open, at the parity, and whether you are in the "
     "group that may use it (dialout)"
 )
-
-log = logging.getLogger(__name__)
-_GATEWAY = (
+_CHECK_GATEWAY = (
     "look at the gateway's power and its network cable, at its address in the rig file, and at who "
     "else is connected to it"
 )
 _READ, _WRITE_ONE, _WRITE = 3, 6, 16
 _GATEWAY_SILENT = 0x0B
-_MEANINGS = {
+_EXCEPTIONS = {
     1: "illegal function",
     2: "illegal data address",
     3: "illegal data value",
@@ -58,57 +56,59 @@ _MEANINGS = {
     _GATEWAY_SILENT: "the device behind the gateway did not answer",
 }
 
+log = logging.getLogger(__name__)
+
 
 class ModbusBus(Closing):
-    """An open line. One exchange at a time; a stop is let in first."""
+    """An open line: one exchange at a time, urgent ones first."""
 
-    def __init__(self, who: str, settings: BusSettings) -> None:
-        self.settings, self.port = settings, settings.port
-        self.turns = PriorityLock()
+    def __init__(self, who: str, settings: BusSettings, clock: Clock) -> None:
+        self.settings, self.port, self.clock = settings, settings.port, clock
+        self.lock = PriorityLock()
         self._tcp = settings.port.startswith("tcp://")
-        self._client = client_for(settings)
+        self._client = client_for(settings, clock)
         self._gone, self._closed = "", False
-        self._heard_s = time.monotonic()
+        self._active_s = clock.now_s()
         self.open(who)
 
     def close(self) -> None:
-        """Let go of the port; safe twice."""
+        """Close the port; safe to call twice."""
         self._closed = True
-        self._let_go()
+        self._close_client()
 
     def open(self, who: str) -> None:
-        """Have the port open; a gateway that has hung up is called again.
+        """Open the port unless it is open; reconnect to a gateway that has hung up.
 
-        A lost serial port stays lost: another device may have got its name.
+        A lost serial port stays lost: another device may have been given its name.
         """
         if self._closed or (self._gone and not self._tcp):
             raise self._lost(who, self._gone or "it was closed")
         try:
             self._client.connect()
         except (OSError, ValueError, termios.error) as error:
-            look = _GATEWAY if self._tcp else _DIALOUT
+            look = _CHECK_GATEWAY if self._tcp else _CHECK_PORT
             raise PortGone(f"{who}: cannot open {self.port}: {error}: {look}") from error
 
-    def quiet_yet(self, who: str) -> bool:
-        """Listen a moment; whether nothing has come for as long as an answer may take."""
+    def listen_for_quiet(self, who: str) -> bool:
+        """Listen briefly; True once the line has been quiet for as long as an answer may take."""
         self.open(who)
-        left_s = self._heard_s + self.settings.reply_s - time.monotonic()
+        left_s = self._active_s + self.settings.reply_s - self.clock.now_s()
         if left_s > 0 and self._guarded(who, lambda: self._client.listen(min(left_s, _SLICE_S))):
-            self._heard_s = time.monotonic()
+            self._active_s = self.clock.now_s()
         return left_s <= 0
 
-    def ask(self, who: str, action: Callable[[Client], T]) -> T:
-        """One request and what came for it; whoever calls has the turn."""
+    def exchange(self, who: str, action: Callable[[Client], T]) -> T:
+        """Send one request and return its answer; the caller holds the lock."""
         self.open(who)
-        client, heard_s = self._client, self._heard_s
+        client, active_s = self._client, self._active_s
         if not self._tcp:
-            time.sleep(max(0.0, heard_s + SILENCE_S - time.monotonic()))
-        self._guarded(who, lambda: client.listen(0.0))  # what nobody asked for
-        client.heard, client.deadline_s = b"", time.monotonic() + self.settings.reply_s
+            self.clock.sleep(active_s + SILENCE_S - self.clock.now_s())
+        self._guarded(who, lambda: client.listen(0.0))  # discard unsolicited bytes
+        client.received, client.deadline_s = b"", self.clock.now_s() + self.settings.reply_s
         try:
             return self._guarded(who, lambda: action(client))
         finally:
-            self._heard_s = time.monotonic()
+            self._active_s = self.clock.now_s()
 
     def _guarded(self, who: str, action: Callable[[], T]) -> T:
         try:
@@ -116,22 +116,22 @@ class ModbusBus(Closing):
         except (ModbusIOException, struct.error, IndexError) as error:
             raise self._no_answer(who) from error
         except (ModbusException, OSError, ValueError, TypeError, AttributeError) as error:
-            # ValueError and the two after it: closed under our hands, by another thread
+            # ValueError, TypeError, AttributeError: another thread has closed the port meanwhile
             raise self._lost(who, str(error)) from error
         except termios.error as error:
             raise self._lost(who, str(error)) from error
 
-    def _let_go(self) -> None:
+    def _close_client(self) -> None:
         try:
             self._client.close()
         except (OSError, termios.error):
-            return  # it is gone already: nothing is left to let go of
+            return  # the port is gone already
 
     def _no_answer(self, who: str) -> DeviceError:
-        heard, within_s = self._client.heard, self.settings.reply_s
-        if heard:
+        received, within_s = self._client.received, self.settings.reply_s
+        if received:
             return Garbled(
-                f"{who}: no whole answer within {within_s:g} s, only {heard[:40].hex(' ')} hex: "
+                f"{who}: no whole answer within {within_s:g} s, only {received[:40].hex(' ')} hex: "
                 f"look at the baud rate, the parity and the cable of {self.port}"
             )
         return NoReply(
@@ -141,16 +141,17 @@ class ModbusBus(Closing):
 
     def _lost(self, who: str, why: str) -> PortGone:
         self._gone = self._gone or why
-        self._let_go()
+        self._close_client()
         return PortGone(
             f"{who}: {self.port} is gone ({why}): look at its plug and its power, then go on"
         )
 
 
 class ModbusUnit:
-    """One device on a line: `unit` is its address, `known_register` begins a block it surely has.
+    """One device on a line, at the address `unit`.
 
-    Nothing else may be asked of the device with one of `resync_counts` registers.
+    `known_register` begins a block of registers that the device certainly has. `resync_counts` are
+    register counts reserved for resynchronising: no other request to the device may use them.
     """
 
     def __init__(
@@ -158,25 +159,26 @@ class ModbusUnit:
     ) -> None:
         self._bus, self._who, self._unit = bus, who, unit
         self._known, self._counts = known_register, cycle(resync_counts)
-        self._why: DeviceError | None = None  # its last answer was lost or wrong
-        self._suspect = True  # whoever had the line before may have left an answer on it
+        self._last_error: DeviceError | None = None
+        self._out_of_step = True  # an earlier user of the line may have left an answer on it
 
     @property
     def where(self) -> str:
         """Port and unit address."""
         return f"{self._bus.port}, unit {self._unit}"
 
-    def read(self, register: int, count: int, until_s: float | None = None) -> list[int]:
-        """`count` registers from `register` on; asked up to three times.
+    def deadline_s(self) -> float:
+        """Return the time of the bus's clock until which an exchange may still begin."""
+        return self._bus.clock.now_s() + GIVE_UP_S
 
-        No try begins after `until_s`, of the monotonic clock.
-        """
-        until = patience() if until_s is None else until_s
+    def read(self, register: int, count: int, until_s: float | None = None) -> list[int]:
+        """Return `count` registers from `register` on; up to three tries, none after `until_s`."""
+        until = self.deadline_s() if until_s is None else until_s
         for tries_left in reversed(range(TRIES)):
             try:
-                return self._trusted(lambda: self._read(register, count), until)
-            except Lost as lost:
-                if not tries_left or time.monotonic() > until:
+                return self._in_step(lambda: self._read(register, count), until)
+            except AnswerLost as lost:
+                if not tries_left or self._bus.clock.now_s() > until:
                     raise
                 log.warning("%s", lost)
         raise NoReply(f"{self._who}: not asked")  # TRIES is not 0
@@ -186,16 +188,17 @@ class ModbusUnit:
         register: int,
         values: Sequence[int],
         until_s: float,
-        unless: Callable[[], None] = lambda: None,
+        check: Callable[[], None] = lambda: None,
     ) -> None:
-        """Write registers, once. `unless` may raise, with the turn taken, and nothing is sent.
+        """Write registers, once. If `check`, called with the lock held, raises, nothing is sent.
 
-        After a lost answer (`Lost`) nobody knows whether it was executed: read it back.
+        After a lost answer (`AnswerLost`) the values may or may not have been taken: read them
+        back.
         """
 
-        def ask() -> None:
-            unless()
-            reply = self._ask(
+        def send() -> None:
+            check()
+            reply = self._exchange(
                 register,
                 _WRITE,
                 lambda c: c.write_registers(register, list(values), device_id=self._unit),
@@ -203,51 +206,51 @@ class ModbusUnit:
             if (reply.address, reply.count) != (register, len(values)):
                 raise self._garbled(f"register {reply.address:04X} hex, count {reply.count}")
 
-        self._trusted(ask, until_s)
+        self._in_step(send, until_s)
 
     def write_at_once(self, register: int, value: int) -> None:
-        """Write one register before whatever waits for the line, even if the device is suspect.
+        """Write one register before all queued exchanges, even if the device is out of step.
 
-        Only for what may be sent twice: it is, up to three times, until it is acknowledged.
+        It is sent up to three times, until it is acknowledged: only for what is safe to repeat.
         """
         for tries_left in reversed(range(TRIES)):
             try:
-                with self._bus.turns.turn(urgent=True):
+                with self._bus.lock.hold(urgent=True):
                     return self._write_one(register, value)
-            except Lost as lost:
+            except AnswerLost as lost:
                 if not tries_left:
                     raise
                 log.warning("%s", lost)
         return None
 
-    def _trusted(self, ask: Callable[[], T], until_s: float) -> T:
-        """Ask once the line can be trusted; the turn is given back after every step."""
-        late_ones = 0
+    def _in_step(self, action: Callable[[], T], until_s: float) -> T:
+        """Resynchronise if necessary, then act; the lock is released after every step."""
+        late_answers = 0
         while True:
-            with self._bus.turns.turn():
-                if not self._suspect:
-                    return ask()
-                if time.monotonic() > until_s:
-                    raise self._why or Garbled(
+            with self._bus.lock.hold():
+                if not self._out_of_step:
+                    return action()
+                if self._bus.clock.now_s() > until_s:
+                    raise self._last_error or Garbled(
                         f"{self._who}: {self._bus.port} does not fall quiet: look at the cable, "
                         "and at what else is connected there"
                     )
-                if not self._bus.quiet_yet(self._who):
+                if not self._bus.listen_for_quiet(self._who):
                     continue
                 try:
-                    self._resync()
-                except Garbled:  # an answer to something earlier: its own comes after it
-                    late_ones += 1
-                    if late_ones > MOST_LATE:
+                    self._resynchronise()
+                except Garbled:  # an answer to an earlier request: its own comes after it
+                    late_answers += 1
+                    if late_answers > MAX_LATE_ANSWERS:
                         raise
 
-    def _resync(self) -> None:
-        """Whatever came before has come, once this answer has: its length tells it from others."""
+    def _resynchronise(self) -> None:
+        """Read a block of unique length: after its answer, no earlier one can still come."""
         self._read(self._known, next(self._counts))
-        self._suspect = False
+        self._out_of_step = False
 
     def _read(self, register: int, count: int) -> list[int]:
-        reply = self._ask(
+        reply = self._exchange(
             register,
             _READ,
             lambda c: c.read_holding_registers(register, count=count, device_id=self._unit),
@@ -257,7 +260,7 @@ class ModbusUnit:
         return list(reply.registers)
 
     def _write_one(self, register: int, value: int) -> None:
-        reply = self._ask(
+        reply = self._exchange(
             register,
             _WRITE_ONE,
             lambda c: c.write_register(register, value, device_id=self._unit),
@@ -265,46 +268,40 @@ class ModbusUnit:
         if (reply.address, reply.registers) != (register, [value]):
             raise self._garbled(f"register {reply.address:04X} hex, {reply.registers}")
 
-    def _ask(
-        self,
-        register: int,
-        function: int,
-        action: Callable[[Client], ModbusPDU],
+    def _exchange(
+        self, register: int, function: int, action: Callable[[Client], ModbusPDU]
     ) -> ModbusPDU:
-        suspect, self._suspect = self._suspect, True
+        out_of_step, self._out_of_step = self._out_of_step, True
         try:
-            reply = self._bus.ask(self._who, action)
-        except Lost as lost:
-            self._why = lost
+            reply = self._bus.exchange(self._who, action)
+        except AnswerLost as lost:
+            self._last_error = lost
             raise
         if reply.function_code & 0x7F != function:
             raise self._garbled(f"an answer to function {reply.function_code & 0x7F}")
         if reply.isError():
-            self._refused(register, reply, suspect)
-        self._suspect = suspect
+            self._raise_refusal(register, reply, out_of_step)
+        self._out_of_step = out_of_step
         return reply
 
-    def _refused(self, register: int, reply: ModbusPDU, suspect: bool) -> None:
+    def _raise_refusal(self, register: int, reply: ModbusPDU, out_of_step: bool) -> None:
         code = reply.exception_code
         text = (
             f"{self._who}: register {register:04X} hex at {self.where}: exception {code:02X} "
-            f"({_MEANINGS.get(code, 'not known here')})"
+            f"({_EXCEPTIONS.get(code, 'not known here')})"
         )
         if code == _GATEWAY_SILENT:
-            self._why = NoReply(f"{text}: look at its power and at the cable behind the gateway")
-            raise self._why
-        self._suspect = suspect
+            self._last_error = NoReply(
+                f"{text}: look at its power and at the cable behind the gateway"
+            )
+            raise self._last_error
+        self._out_of_step = out_of_step
         raise DeviceError(f"{text}: look at which device this is, and at its manual")
 
     def _garbled(self, what: str) -> Garbled:
-        self._suspect = True
-        self._why = wrong = Garbled(
+        self._out_of_step = True
+        self._last_error = error = Garbled(
             f"{self._who}: {self.where} answered something else than was asked: {what}: look at "
             "the cable, and for a second master on the line"
         )
-        return wrong
-
-
-def patience() -> float:
-    """Until when, of the monotonic clock, an exchange may still begin."""
-    return time.monotonic() + GIVES_UP_S
+        return error

@@ -1,6 +1,6 @@
-"""pymodbus' blocking clients, hearing at once and never longer than until their deadline.
+"""pymodbus' blocking clients with prompt reads and a deadline for each request.
 
-pymodbus' own `recv` polls a serial port every millisecond and may wait its time-out several times.
+pymodbus' own `recv` polls a serial port every millisecond and may wait several time-outs.
 """
 
 from __future__ import annotations
@@ -8,7 +8,6 @@ from __future__ import annotations
 import logging
 import select
 import socket
-import time
 from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
@@ -19,6 +18,7 @@ from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException
 
 from drivers.lines.serial_line import REPLY_S, WRITE_S
+from instrument.clock import Clock
 from instrument.errors import InputError
 
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # errors are raised, not printed
@@ -26,10 +26,9 @@ logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # errors are ra
 
 @dataclass(frozen=True, slots=True)
 class BusSettings:
-    """Where the line is: a serial device's path, or `tcp://host:port` of a gateway.
+    """Address of the line: a serial device's path, or `tcp://host:port` of a gateway.
 
-    `reply_s`: how long a device may take to answer, in seconds. Pseudo-terminals know no parity
-    but N.
+    `reply_s`: time allowed for an answer, in seconds. Pseudo-terminals support only parity N.
     """
 
     port: str
@@ -38,41 +37,42 @@ class BusSettings:
     reply_s: float = REPLY_S
 
 
-class _Prompt:
-    """Hears at once what comes, and no longer than until its deadline."""
+class _DeadlineClient:
+    """Reads return as soon as bytes arrive, and at the deadline at the latest."""
 
+    clock: Clock
     deadline_s = 0.0
-    heard = b""
+    received = b""
     socket: Any  # pymodbus' name for what is open: a serial port or a socket
 
     def close(self) -> None:
-        """Let go of it; safe twice."""
+        """Close the connection; safe to call twice."""
         port, self.socket = self.socket, None
         if port is not None:
             port.close()
 
     def recv(self, _size: int | None) -> bytes:
-        """What comes before the deadline, of whatever size."""
-        data = self.listen(self.deadline_s - time.monotonic())
-        self.heard += data
+        """Return the bytes that arrive before the deadline, however many."""
+        data = self.listen(self.deadline_s - self.clock.now_s())
+        self.received += data
         return data
 
     def listen(self, seconds: float) -> bytes:
-        """What comes within `seconds`; empty when nothing does."""
+        """Return the bytes that arrive within `seconds`, or none."""
         port = self.socket
         ready = port is not None and _ready(port.fileno(), seconds)
         return self._read(port) if ready else b""
 
     @abstractmethod
     def _read(self, port: Any) -> bytes:
-        """What has come."""
+        """Return the bytes that have arrived."""
 
 
-class SerialClient(_Prompt, ModbusSerialClient):
-    """Over a serial port."""
+class SerialClient(_DeadlineClient, ModbusSerialClient):
+    """Modbus RTU over a serial port."""
 
     def connect(self) -> bool:
-        """Open it, if it is not; the error says why it cannot be."""
+        """Open the port unless it is open; raise the system's error if that fails."""
         if self.socket is None:
             how = self.comm_params
             self.socket = serial.serial_for_url(
@@ -85,11 +85,11 @@ class SerialClient(_Prompt, ModbusSerialClient):
         return bytes(port.read(port.in_waiting or 1))
 
 
-class TcpClient(_Prompt, ModbusTcpClient):
-    """Over a socket; a connection that the gateway has closed is an error."""
+class TcpClient(_DeadlineClient, ModbusTcpClient):
+    """Modbus TCP; a connection that the gateway has closed is an error."""
 
     def connect(self) -> bool:
-        """Open it, if it is not; the error says why it cannot be."""
+        """Connect unless connected; raise the system's error if that fails."""
         if self.socket is None:
             how = self.comm_params
             self.socket = socket.create_connection((how.host, how.port), how.timeout_connect)
@@ -106,22 +106,30 @@ class TcpClient(_Prompt, ModbusTcpClient):
 Client: TypeAlias = SerialClient | TcpClient
 
 
-def client_for(settings: BusSettings) -> Client:
-    """A client for the line, not yet open; nothing is ever sent twice by itself."""
-    timeout = settings.reply_s
-    if not settings.port.startswith("tcp://"):
-        return SerialClient(
+def client_for(settings: BusSettings, clock: Clock) -> Client:
+    """Return a client for the line, not yet open; pymodbus' own retries are off."""
+    client: Client
+    if settings.port.startswith("tcp://"):
+        host, port = _tcp_address(settings.port)
+        client = TcpClient(host, port=port, timeout=settings.reply_s, retries=0)
+    else:
+        client = SerialClient(
             settings.port, baudrate=settings.baudrate, parity=settings.parity,
-            timeout=timeout, retries=0,
+            timeout=settings.reply_s, retries=0,
         )  # fmt: skip
+    client.clock = clock
+    return client
+
+
+def _tcp_address(address: str) -> tuple[str, int]:
     try:
-        where = urlsplit(settings.port)
-        host, port = where.hostname, where.port
+        url = urlsplit(address)
+        host, port = url.hostname, url.port
     except ValueError:
         host, port = None, None
     if not host:
-        raise InputError(f"{settings.port}: not an address: write tcp://host:port")
-    return TcpClient(host, port=port or 502, timeout=timeout, retries=0)
+        raise InputError(f"{address}: not an address: write tcp://host:port")
+    return host, port or 502
 
 
 def _ready(descriptor: int, seconds: float) -> bool:

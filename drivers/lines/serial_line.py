@@ -1,7 +1,7 @@
-"""A serial line: bytes out, lines in, each with a deadline; what goes wrong names the port.
+"""Serial line with deadlines: bytes out, text lines in; errors name the port.
 
-pyserial's own behaviour on a lost port differs from call to call (`SerialException`, `OSError`,
-`termios.error`): here all of it is `PortGone`.
+pyserial reports a lost port as `SerialException`, `OSError` or `termios.error`, depending on the
+call. Here each of them becomes `PortGone`.
 """
 
 from __future__ import annotations
@@ -9,18 +9,18 @@ from __future__ import annotations
 import math
 import re
 import termios
-import time
 from collections.abc import Callable
 from typing import TypeVar
 
 from drivers.lines.priority_lock import PriorityLock
+from instrument.clock import Clock
 from instrument.closeable import Closing
 from instrument.errors import DeviceError
 
-REPLY_S = 0.15  # controllers answer within 10 to 50 ms; a stop waits no longer than this, and an
-# answer that was lost is had again before the status of a moving stage is too old
-WRITE_S = 0.5  # pyserial counts the time that a busy computer takes it off the processor, too
-MOST_BYTES = 1024  # of a line: what is longer is noise
+REPLY_S = 0.15  # controllers answer within 10 to 50 ms; a stop waits no longer than this, and a
+# lost answer is asked for again before the status of a moving stage is too old
+WRITE_S = 0.5  # pyserial also counts the time for which a busy computer suspends the process
+MAX_LINE_BYTES = 1024  # anything longer is noise
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 A = TypeVar("A")
@@ -28,7 +28,7 @@ T = TypeVar("T")
 
 
 class PortGone(DeviceError):
-    """The port vanished or cannot be used: unplugged, taken, forbidden."""
+    """The port vanished or cannot be used: unplugged, in use, or not permitted."""
 
 
 class NoReply(DeviceError):
@@ -36,11 +36,11 @@ class NoReply(DeviceError):
 
 
 class Garbled(DeviceError):
-    """What came is no answer to what was asked."""
+    """The bytes received are not a valid answer to the question."""
 
 
 def number_of(text: str) -> float | None:
-    """A number as controllers write it, `-12.5` or `1.2E-05`; None for all else, nan and inf."""
+    """Return a number written as `-12.5` or `1.2E-05`; None for anything else, nan and inf."""
     value = float(text) if _NUMBER.fullmatch(text) else math.inf
     return value if math.isfinite(value) else None
 
@@ -53,15 +53,17 @@ class Line(Closing):
         who: str,
         port: str,
         baudrate: int,
+        clock: Clock,
         xonxoff: bool = False,
         reply_s: float = REPLY_S,
     ) -> None:
         import serial
 
         self.who, self.port, self.reply_s = who, port, reply_s
-        self.turns = PriorityLock()
-        self.dirty = False
-        """Whether an answer is still owed: what comes next may belong to an earlier question."""
+        self.lock = PriorityLock()
+        self.reply_pending = False
+        """True after a lost answer: the next bytes may answer an earlier question."""
+        self._clock = clock
         self._buffer = bytearray()
         try:
             self._serial = serial.serial_for_url(
@@ -75,41 +77,42 @@ class Line(Closing):
             ) from error
 
     def close(self) -> None:
-        """Let go of the port; safe twice."""
+        """Close the port; safe to call twice."""
         try:
             self._serial.close()
         except (OSError, termios.error):
-            return  # it is gone already: nothing is left to let go of
+            return  # the port is gone already
 
     def write(self, data: bytes) -> None:
         """Send bytes."""
         self._guarded(self._serial.write, data)
 
     def read_line(self, deadline_s: float, who: str) -> bytes:
-        """The next line without its end, NUL bytes dropped; `NoReply` past the monotonic deadline.
+        """Return the next line without its end and without NUL bytes.
 
-        A controller whose motor supply was cut sends NULs.
+        `deadline_s` is a time of the line's clock; `NoReply` is raised when it has passed. A
+        controller whose motor supply was cut sends NULs.
         """
         while (end := self._buffer.find(b"\n")) < 0:
-            left_s = deadline_s - time.monotonic()
-            if left_s <= 0 or len(self._buffer) > MOST_BYTES:
+            left_s = deadline_s - self._clock.now_s()
+            if left_s <= 0 or len(self._buffer) > MAX_LINE_BYTES:
                 raise self._no_line(who)
             self._buffer += self._guarded(self._read, left_s)
-        if end > MOST_BYTES:
+        if end > MAX_LINE_BYTES:
             raise self._no_line(who)
         line = bytes(self._buffer[:end])
         del self._buffer[: end + 1]
         return line.replace(b"\0", b"").strip(b"\r")
 
-    def exchange(self, who: str, request: bytes, pick: Callable[[bytes], T | None]) -> T:
-        """Send a request and return what `pick` makes of its answer, the first that it takes.
+    def exchange(self, who: str, request: bytes, parse: Callable[[bytes], T | None]) -> T:
+        """Send a request and return the first result of `parse` that is not None.
 
-        Other lines (an alert, a late answer to another question) are passed over. The caller has
-        the turn; `who` asks, and is named in errors.
+        Lines for which `parse` returns None (alerts, late answers to other questions) are
+        skipped. The caller holds the lock; errors name `who`.
         """
-        self.dirty = True
+        self.reply_pending = True
         self.write(request)
-        deadline_s = time.monotonic() + self.reply_s
+        deadline_s = self._clock.now_s() + self.reply_s
         foreign = b""
         while True:
             try:
@@ -118,29 +121,29 @@ class Line(Closing):
                 if foreign:
                     raise self._garbled(who, foreign) from None
                 raise
-            found = pick(line)
-            if found is not None:
-                self.dirty = False
-                return found
+            answer = parse(line)
+            if answer is not None:
+                self.reply_pending = False
+                return answer
             foreign = line or foreign
 
     def drain(self, quiet_s: float) -> bytes:
-        """Throw away what comes until nothing has come for `quiet_s`; returns it.
+        """Discard input until the line has been quiet for `quiet_s`; return what was discarded.
 
-        A device that never stops talking raises `Garbled`.
+        Raises `Garbled` for a device that sends without end.
         """
-        thrown, self._buffer = bytes(self._buffer), bytearray()
-        last_s = time.monotonic()
-        while time.monotonic() - last_s < quiet_s:
+        discarded, self._buffer = bytes(self._buffer), bytearray()
+        last_s = self._clock.now_s()
+        while self._clock.now_s() - last_s < quiet_s:
             more = self._guarded(self._read, quiet_s)
             if more:
-                thrown, last_s = thrown + more, time.monotonic()
-            if len(thrown) > 100 * MOST_BYTES:
+                discarded, last_s = discarded + more, self._clock.now_s()
+            if len(discarded) > 100 * MAX_LINE_BYTES:
                 raise Garbled(
-                    f"{self.who}: {self.port} sends without end, as {thrown[:40]!r}: look at the "
-                    "baud rate and at what is connected there"
+                    f"{self.who}: {self.port} sends without end, as {discarded[:40]!r}: look at "
+                    "the baud rate and at what is connected there"
                 )
-        return thrown
+        return discarded
 
     def _read(self, timeout_s: float) -> bytes:
         self._serial.timeout = timeout_s
@@ -155,16 +158,16 @@ class Line(Closing):
             f"of {self.port}"
         )
 
-    def _garbled(self, who: str, what: bytes) -> Garbled:
+    def _garbled(self, who: str, received: bytes) -> Garbled:
         return Garbled(
-            f"{who}: no answer within {self.reply_s:g} s that makes sense, only "
-            f"{what[:40]!r}: look at the baud rate and at the cable of {self.port}"
+            f"{who}: no valid answer within {self.reply_s:g} s, only {received[:40]!r}: look at "
+            f"the baud rate and at the cable of {self.port}"
         )
 
     def _guarded(self, action: Callable[[A], T], argument: A) -> T:
         try:
             return action(argument)
-        except (OSError, TypeError, termios.error) as error:  # TypeError: closed under our hands
+        except (OSError, TypeError, termios.error) as error:  # TypeError: closed meanwhile
             raise PortGone(
                 f"{self.who}: {self.port} is gone ({error}): look at its USB plug and its power, "
                 "then go on"

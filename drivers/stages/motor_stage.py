@@ -1,7 +1,7 @@
-"""What all motor stages share: limits before a byte is sent, homing first, checked positions.
+"""Common base of all motor stages: limits before a byte is sent, homing first, checked positions.
 
-A driver says how its controller is asked and told; when a move has begun and ended, what counts as
-a stall and when a stop is sent is written here, once.
+A driver provides the exchanges with its controller. The rules that tell when a move has begun and
+ended, what counts as a stall, and when a stop is sent are here.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from instrument.kinematics import Trapezoid
 log = logging.getLogger(__name__)
 
 POLL_S = 0.005
-STARTS_WITHIN_S = 0.5  # some controllers still say ready just after the command
-STALLED_S = 1.0  # said to move, but at the same place
+STARTS_WITHIN_S = 0.5  # some controllers still report ready just after the command
+STALLED_S = 1.0  # reported as moving, but at the same position
 _ROUNDING_DEG = 1e-9
-_UNHEARD = f"no status for {SILENT_S:g} s while it moved, so it was told to stop"
+_NO_STATUS = f"no status for {SILENT_S:g} s while it moved, so it was told to stop"
 
 
 class Stopped(DeviceError):
     """The motion was stopped before it reached its end."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """What a stage may do, in the device's own degrees: the rig file's and its maker's numbers.
+    """Limits of a stage from the rig file, in the device's own degrees.
 
-    `tolerance_deg`: how far from the target a move may end. `homing_s`: how long finding the
-    reference may take, `home_deg` where the stage stands then.
+    A move may end up to `tolerance_deg` from its target. Homing may take up to `homing_s` and ends
+    at `home_deg`.
     """
 
     min_deg: float
@@ -47,7 +47,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What a controller says of itself; `fault` is empty or says what to look at."""
+    """Status reported by a controller; `fault` is empty or says what to look at."""
 
     position_deg: float
     moving: bool
@@ -59,7 +59,7 @@ class MotorStage(ABC):
     """A stage behind a controller. Angles are the device's own degrees."""
 
     KEEPS_REFERENCE = False
-    """Whether a controller that has its reference refuses to look for it again."""
+    """True for controllers that refuse to search for a reference that they have."""
 
     def __init__(self, name: str, limits: Limits, clock: Clock) -> None:
         self.name, self._limits, self._clock = name, limits, clock
@@ -67,54 +67,54 @@ class MotorStage(ABC):
         self._from_deg = 0.0
         self._started_s = 0.0
         self._stopped = False
-        self._watchdog = Watchdog(name, self._glanced, self._give_up)
+        self.watchdog = Watchdog(name, self._probe, self._stop_unwatched, clock)
 
-    # What a driver says: how its controller is asked and told.
+    # To be provided by a driver.
 
     @abstractmethod
     def identity(self) -> str:
-        """Who answers: maker, model, serial number."""
+        """Return maker, model and serial number of the device that answers."""
 
     @abstractmethod
-    def status(self, patient: bool = True) -> Status:
-        """Where the stage is and what it does; not `patient`: no question is asked again."""
+    def status(self, retry: bool = True) -> Status:
+        """Read position and state; without `retry` no question is repeated."""
 
     @abstractmethod
     def close(self) -> None:
-        """Let go of the line; safe twice."""
+        """Release the line; safe to call twice."""
 
     @abstractmethod
     def _own_limits_deg(self) -> tuple[float, float]:
-        """The limits that the controller itself keeps; infinite where it keeps none."""
+        """Return the limits set in the controller; infinite if it has none."""
 
     @abstractmethod
     def _send_home(self) -> None:
-        """Have the controller look for its reference."""
+        """Start the controller's search for its reference."""
 
     @abstractmethod
     def _apply_speed(self) -> None:
-        """Tell a controller that keeps its speed what the rig file says; after homing."""
+        """Set the rig file's speed in a controller that stores one; called after homing."""
 
     @abstractmethod
     def _send_move(self, angle_deg: float) -> None:
-        """Have it move, once. Where the answer is lost, the stage's own state tells."""
+        """Send one move command; if its answer is lost, the stage's state decides."""
 
     @abstractmethod
     def _send_stop(self) -> None:
-        """End all motion, before whatever waits for the line."""
+        """End all motion, ahead of everything that waits for the line."""
 
     def _own_settings(self) -> dict[str, str]:
-        """What the controller says that it is set to, beside its limits."""
+        """Return the controller's settings, apart from its limits."""
         return {}
 
-    # What the program asks for.
+    # For the program.
 
     def homed(self) -> bool:
-        """Whether the controller knows its reference, asked once the stage has come to rest."""
-        return self._at_rest(self.status()).homed
+        """True if the controller knows its reference, read once the stage is at rest."""
+        return self._wait_for_rest(self.status()).homed
 
-    def _at_rest(self, now: Status) -> Status:
-        """The status once a stage that was stopped has come to rest."""
+    def _wait_for_rest(self, now: Status) -> Status:
+        """Return the status once a stage that was stopped is at rest."""
         ramp_s = self._limits.speed_deg_per_s / self._limits.acceleration_deg_per_s2
         until_s = self._clock.now_s() + ramp_s + STALLED_S
         while now.moving:
@@ -127,30 +127,30 @@ class MotorStage(ABC):
             now = self.status()
         return now
 
-    def _standing(self) -> Status:
-        """The status of a stage that may be told to move: one that moves is left alone."""
+    def _status_before_motion(self) -> Status:
+        """Return the status at rest; refuse a stage that is still executing a move."""
         now = self.status()
         if now.moving and not self._stopped:
             raise DeviceError(
-                f"{self.name}: is on its way already, at {now.position_deg:g} deg: wait for its "
+                f"{self.name}: is moving already, at {now.position_deg:g} deg: wait for its "
                 "end, or stop it first"
             )
-        return self._at_rest(now)
+        return self._wait_for_rest(now)
 
     def settings(self) -> dict[str, str]:
-        """The limits that hold, and what the controller says that it is set to."""
+        """Return the limits in force and the controller's settings."""
         low, high = self.limits_deg()
         return {"limits_deg": f"{low:g} to {high:g}", **self._own_settings()}
 
     def limits_deg(self) -> tuple[float, float]:
-        """The narrower of the rig file's limits and the controller's."""
+        """Return the narrower of the rig file's limits and the controller's, in degrees."""
         low, high = self._own_limits_deg()
         return max(low, self._limits.min_deg), min(high, self._limits.max_deg)
 
     def position_deg(self) -> float:
-        """Where the stage is. Before homing nobody knows, whatever the controller counts.
+        """Return the position in degrees; refused before homing and while there is a fault.
 
-        Nor while its controller has a fault: a motor that was let go may stand anywhere.
+        Before homing the controller's count means nothing; a motor without current may be turned.
         """
         now = self.status()
         self._refuse_fault(now)
@@ -161,43 +161,43 @@ class MotorStage(ABC):
         return now.position_deg
 
     def home(self) -> None:
-        """Find the reference and stand at home; a controller that keeps it only goes there."""
-        now = self._standing()
+        """Find the reference and stop at home; a controller that keeps its reference only moves."""
+        now = self._status_before_motion()
         self._refuse_fault(now)
         if now.homed and self.KEEPS_REFERENCE:
             self._apply_speed()
             self.start_move(self._limits.home_deg)
             self.wait()
             return
-        self._look_for_reference(again=now.homed)
+        self._find_reference(again=now.homed)
         self._apply_speed()
 
-    def _look_for_reference(self, again: bool) -> None:
+    def _find_reference(self, again: bool) -> None:
         self._stopped, self._target_deg = False, None
-        self._watchdog.begin()
+        self.watchdog.begin()
         try:
-            self._watch_homing(again)
+            self._monitor_homing(again)
         finally:
-            self._watchdog.end()
+            self.watchdog.end()
 
-    def _watch_homing(self, again: bool) -> None:
+    def _monitor_homing(self, again: bool) -> None:
         self._send_home()
-        self._stop_if_stopped()
-        watch = _Homing(self._limits.homing_s, self._clock.now_s(), again)
-        while not watch.ended(now := self._looked()):
-            if watch.not_begun(self._clock.now_s()):
-                log.warning("%s: stands still: told again to look for its reference", self.name)
+        self._repeat_stop()
+        monitor = _HomingMonitor(self._limits.homing_s, self._clock.now_s(), again)
+        while not monitor.ended(now := self._poll()):
+            if monitor.should_resend(self._clock.now_s()):
+                log.warning("%s: stands still: homing command sent again", self.name)
                 self._send_home()  # it stands and has no reference: the command never arrived
-            wrong = watch.wrong(self._clock.now_s())
-            if wrong:
+            problem = monitor.problem(self._clock.now_s())
+            if problem:
                 self.stop()
-                raise DeviceError(f"{self.name}: {wrong}, at {now.position_deg:g} deg")
+                raise DeviceError(f"{self.name}: {problem}, at {now.position_deg:g} deg")
             self._clock.sleep(POLL_S)
 
     def start_move(self, angle_deg: float) -> None:
-        """Begin to move; refused before homing, past a limit, and while the controller has a fault.
+        """Start a move to an angle in degrees.
 
-        Nothing is sent then.
+        Before homing, past a limit and while there is a fault it is refused and nothing is sent.
         """
         low, high = self.limits_deg()
         if not low - _ROUNDING_DEG <= angle_deg <= high + _ROUNDING_DEG:
@@ -205,88 +205,88 @@ class MotorStage(ABC):
                 f"{self.name}: {angle_deg:g} deg asked for; its limits are {low:g} to {high:g} deg "
                 "(the device's own degrees): nothing has moved"
             )
-        now = self._standing()
+        now = self._status_before_motion()
         self._refuse_fault(now)
         if not now.homed:
             raise DeviceError(f"{self.name}: not homed, so it must not move: home it first")
         self._stopped = False
         self._from_deg, self._target_deg = now.position_deg, angle_deg
         self._started_s = self._clock.now_s()
-        self._watchdog.begin()
+        self.watchdog.begin()
         try:
             self._send_move(angle_deg)
-            self._stop_if_stopped()
+            self._repeat_stop()
         except BaseException:
-            self._watchdog.end()
+            self.watchdog.end()
             raise
 
     def wait(self) -> float:
-        """Wait until the move has ended; returns where, in degrees, which must be the target."""
+        """Wait for the end of the move; check the position and return it, in degrees."""
         if self._target_deg is None:
             return self.position_deg()
         try:
-            return self._watch_move(self._target_deg)
+            return self._monitor_move(self._target_deg)
         finally:
-            self._watchdog.end()
+            self.watchdog.end()
 
-    def _watch_move(self, target_deg: float) -> float:
-        watch = _Watch(self._limits, self._from_deg, target_deg, self._started_s)
-        while not watch.ended(now := self._looked()):
-            self._refuse_lost(now)
+    def _monitor_move(self, target_deg: float) -> float:
+        monitor = _MoveMonitor(self._limits, self._from_deg, target_deg, self._started_s)
+        while not monitor.ended(now := self._poll()):
+            self._refuse_lost_reference(now)
             time_s = self._clock.now_s()
-            if watch.not_begun(time_s):
-                log.warning("%s: stands still: told again to go to %g deg", self.name, target_deg)
-                self._send_move(target_deg)  # it stands where it was: nothing arrived
-                self._stop_if_stopped()
-            wrong = watch.wrong(now, time_s)
-            if wrong:
+            if monitor.should_resend(time_s):
+                log.warning("%s: stands still: move to %g deg sent again", self.name, target_deg)
+                self._send_move(target_deg)  # it has not moved: the command never arrived
+                self._repeat_stop()
+            problem = monitor.problem(now, time_s)
+            if problem:
                 self._target_deg = None
                 self.stop()
-                raise DeviceError(f"{self.name}: {wrong}")
+                raise DeviceError(f"{self.name}: {problem}")
             self._clock.sleep(POLL_S)
-        return self._arrived(now)
+        return self._check_arrival(now)
 
     def stop(self) -> None:
-        """End all motion now; safe at any time, twice, and from another thread."""
+        """End all motion now; safe at any time, repeatedly, and from any thread."""
         self._stopped = True
-        self._watchdog.end()
+        self.watchdog.end()
         self._send_stop()
 
-    def _looked(self) -> Status:
-        """The status of a stage that neither has a fault nor was stopped; else `DeviceError`."""
+    def _poll(self) -> Status:
+        """Return the status during a motion; raise if there is a fault or the stage was stopped."""
         try:
-            now = self._watchdog.hear(self.status)
+            now = self.watchdog.poll(self.status)
         except DeviceError as error:
-            if self._watchdog.fired:
-                raise type(error)(f"{error}; {_UNHEARD}") from error
+            if self.watchdog.fired:
+                raise type(error)(f"{error}; {_NO_STATUS}") from error
             raise
-        if self._watchdog.fired:
+        if self.watchdog.fired:
             self._target_deg = None
-            raise DeviceError(f"{self.name}: {_UNHEARD}: look at its cable, then home it")
+            raise DeviceError(f"{self.name}: {_NO_STATUS}: look at its cable, then home it")
         if self._stopped:
             self._target_deg = None
             raise Stopped(f"{self.name}: stopped at {now.position_deg:g} deg")
         self._refuse_fault(now)
         return now
 
-    def _glanced(self) -> bool:
-        """Whether the controller answers, asked while nobody else asks."""
+    def _probe(self) -> bool:
+        """Ask for the status without retries; True if the controller answers."""
         try:
-            self.status(patient=False)
+            self.status(retry=False)
         except DeviceError as error:
             log.warning("%s", error)
             return False
         return True
 
-    def _give_up(self) -> None:
-        """Stop what moves unheard."""
+    def _stop_unwatched(self) -> None:
+        """Stop a motion of which no status was received; never raises."""
         try:
             self.stop()
         except DeviceError as error:
-            log.error("%s: %s; the stop failed too: %s", self.name, _UNHEARD, error)
+            log.error("%s: %s; the stop failed too: %s", self.name, _NO_STATUS, error)
 
-    def _arrived(self, now: Status) -> float:
-        self._refuse_lost(now)
+    def _check_arrival(self, now: Status) -> float:
+        self._refuse_lost_reference(now)
         target, self._target_deg = self._target_deg, None
         if target is not None and abs(now.position_deg - target) > self._limits.tolerance_deg:
             raise DeviceError(
@@ -296,14 +296,14 @@ class MotorStage(ABC):
             )
         return now.position_deg
 
-    def _stop_if_stopped(self) -> None:
-        """A stop that came while the command was on its way must not be overtaken by it."""
+    def _repeat_stop(self) -> None:
+        """Repeat a stop that came while a command was being sent and may have overtaken it."""
         if self._stopped:
             self._send_stop()
             raise Stopped(f"{self.name}: stopped as it was about to move")
 
-    def _refuse_lost(self, now: Status) -> None:
-        """A controller that was without power counts from nowhere."""
+    def _refuse_lost_reference(self, now: Status) -> None:
+        """Raise if the reference was lost: a controller that was without power has no position."""
         if not now.homed and not now.moving:
             self._target_deg = None
             raise DeviceError(
@@ -317,27 +317,27 @@ class MotorStage(ABC):
             raise DeviceError(f"{self.name}: {now.fault}")
 
 
-class _Homing:
-    """Whether finding the reference goes as it should; `again`: it was known before."""
+class _HomingMonitor:
+    """Checks that homing begins and ends in time; `again`: the reference was known before."""
 
     def __init__(self, allowed_s: float, started_s: float, again: bool) -> None:
         self._allowed_s, self._started_s, self._known = allowed_s, started_s, again
-        self._moved = self._again = False
+        self._moved = self._resent = False
 
     def ended(self, now: Status) -> bool:
-        """The reference is known and the stage stands."""
+        """True once the reference is known and the stage stands."""
         self._moved |= now.moving
         self._known &= now.homed and not now.moving
         return now.homed and not now.moving and not self._known
 
-    def not_begun(self, time_s: float) -> bool:
-        """Once: it should move by now, and does not."""
-        late = not self._moved and not self._again and time_s - self._started_s > STARTS_WITHIN_S
-        self._again |= late
+    def should_resend(self, time_s: float) -> bool:
+        """True once, if the stage should be moving by now and is not."""
+        late = not self._moved and not self._resent and time_s - self._started_s > STARTS_WITHIN_S
+        self._resent |= late
         return late
 
-    def wrong(self, time_s: float) -> str:
-        """What is wrong, or nothing."""
+    def problem(self, time_s: float) -> str:
+        """Return a description of what is wrong, or an empty text."""
         since_s = time_s - self._started_s
         if not self._moved and since_s > 2 * STARTS_WITHIN_S:
             return "did not begin to look for its reference: look at its motor's supply"
@@ -349,8 +349,8 @@ class _Homing:
         return ""
 
 
-class _Watch:
-    """Whether a move goes as it should: it begins, gets on, and ends in time."""
+class _MoveMonitor:
+    """Checks that a move begins, makes progress, and ends in time."""
 
     def __init__(self, limits: Limits, start: float, target: float, started_s: float) -> None:
         self._limits, self._target, self._started_s = limits, target, started_s
@@ -358,21 +358,21 @@ class _Watch:
         self._allowed_s = 1.5 * way.duration_s + 2.0
         self._start = self._at = start
         self._at_s = started_s
-        self._begun = self._again = False
+        self._begun = self._resent = False
 
     def ended(self, now: Status) -> bool:
-        """No longer moving, and not because it has not begun yet."""
+        """True once the stage stands, unless the move has not begun yet."""
         self._begun |= now.moving or abs(now.position_deg - self._start) > self._step_deg
-        return not now.moving and (self._begun or self._there(now))
+        return not now.moving and (self._begun or self._at_target(now))
 
-    def not_begun(self, time_s: float) -> bool:
-        """Once: it should move by now, and stands where it was."""
-        late = not self._begun and time_s - self._started_s > STARTS_WITHIN_S
-        once, self._again = late and not self._again, self._again or late
-        return once
+    def should_resend(self, time_s: float) -> bool:
+        """True once, if the stage should be moving by now and has not moved."""
+        late = not self._begun and not self._resent and time_s - self._started_s > STARTS_WITHIN_S
+        self._resent |= late
+        return late
 
-    def wrong(self, now: Status, time_s: float) -> str:
-        """What is wrong with the move, or nothing."""
+    def problem(self, now: Status, time_s: float) -> str:
+        """Return a description of what is wrong with the move, or an empty text."""
         if abs(now.position_deg - self._at) > self._step_deg:
             self._at, self._at_s = now.position_deg, time_s
         since_s = time_s - self._started_s
@@ -389,5 +389,5 @@ class _Watch:
     def _step_deg(self) -> float:
         return self._limits.tolerance_deg / 10
 
-    def _there(self, now: Status) -> bool:
+    def _at_target(self, now: Status) -> bool:
         return abs(now.position_deg - self._target) <= self._limits.tolerance_deg

@@ -24,45 +24,45 @@ T = TypeVar("T")
 class NewportPort:
     """One controller, by its address on a line that others may share.
 
-    An answer is trusted only on a clean line: after any time-out what comes late is thrown away,
-    and the version that was read at the opening must be read again.
+    Answers carry no number, so one is trusted only on a clean line. After a time-out the input is
+    drained, and the controller must report the same version as when it was opened.
     """
 
     def __init__(self, line: Line, address: int, who: str) -> None:
         self.line, self.address, self.who = line, address, who
         self._version = ""
-        self._version = self.ask("VE", str)
+        self._version = self.query("VE", str)
 
     @property
     def version(self) -> str:
-        """What the controller calls itself."""
+        """Version text of the controller."""
         return self._version
 
-    def ask(
-        self, letters: str, read: Callable[[str], T], value: str = "", tries: int = _TRIES
+    def query(
+        self, letters: str, parse: Callable[[str], T], value: str = "", tries: int = _TRIES
     ) -> T:
-        """The answer to a query; a query may be asked again."""
+        """Return the parsed answer to a query; a query may be repeated."""
         for _ in range(tries):
             try:
-                with self.line.turns.turn():
-                    return self._ask_once(letters, read, value)
+                with self.line.lock.hold():
+                    return self._query_once(letters, parse, value)
             except (NoReply, Garbled) as error:
                 log.warning("%s", error)
                 last = error
         raise last
 
-    def tell(self, letters: str, value: str | float = "") -> None:
-        """Send a command, once, and ask whether it was taken.
+    def send(self, letters: str, value: str | float = "") -> None:
+        """Send a command, once, and ask for its error code.
 
-        A lost answer leaves that open; the stage's state has to tell then.
+        If that answer is lost, the command may or may not have been executed.
         """
-        with self.line.turns.turn():
+        with self.line.lock.hold():
             self._clean()
             self.line.write(framing.command(self.address, letters, value))
             try:
-                letter = self._ask_once("TE", str, "")
+                letter = self._query_once("TE", str, "")
             except (NoReply, Garbled) as error:
-                log.warning("%s; whether it took %s is open", error, letters)
+                log.warning("%s; %s may or may not have been taken", error, letters)
                 return  # reading the error again would find it cleared
         if letter != "@":
             why = framing.ERRORS.get(letter[:1], "an error that this program does not know")
@@ -71,36 +71,36 @@ class NewportPort:
             )
 
     def stop(self) -> None:
-        """Stop this axis. Needs no turn: ST is not answered, and the line carries both ways."""
+        """Stop this axis, without the lock: ST has no answer, and the line is full duplex."""
         self.line.write(framing.command(self.address, "ST"))
 
-    def _ask_once(self, letters: str, read: Callable[[str], T], value: str) -> T:
+    def _query_once(self, letters: str, parse: Callable[[str], T], value: str) -> T:
         self._clean()
-        request = framing.command(self.address, letters, value)
-        text = self.line.exchange(
-            self.who, request, lambda line: framing.answer_to(self.address, letters, line)
-        )
+        text = self._exchange(letters, value)
         try:
-            return read(text)
+            return parse(text)
         except Garbled:
-            self.line.dirty = True
+            self.line.reply_pending = True
             raise
 
+    def _exchange(self, letters: str, value: str = "") -> str:
+        request = framing.command(self.address, letters, value)
+        return self.line.exchange(
+            self.who, request, lambda line: framing.answer_to(self.address, letters, line)
+        )
+
     def _clean(self) -> None:
-        """Throw away what is late; then the controller must give its name again."""
-        if not self.line.dirty:
+        """After a lost answer: drain the line, then verify the controller's version."""
+        if not self.line.reply_pending:
             return
         self.line.drain(_QUIET_S)
-        if not self._version:  # at the opening there is nothing yet to compare with
-            self.line.dirty = False
+        if not self._version:  # while opening there is nothing yet to compare with
+            self.line.reply_pending = False
             return
-        request = framing.command(self.address, "VE")
-        name = self.line.exchange(
-            self.who, request, lambda li: framing.answer_to(self.address, "VE", li)
-        )
-        if name != self._version:
-            self.line.dirty = True
-            raise Garbled(f"{self.who}: calls itself {name!r} now, and {self._version!r} before")
+        version = self._exchange("VE")
+        if version != self._version:
+            self.line.reply_pending = True
+            raise Garbled(f"{self.who}: calls itself {version!r} now, and {self._version!r} before")
 
 
 class NewportStage(MotorStage):
@@ -119,49 +119,48 @@ class NewportStage(MotorStage):
                 f"{self._who}: calls itself {self._port.version!r}; expected: a {model}: look at "
                 "the port and the address in the rig file"
             )
-        self._stage = self._port.ask("ID", str, "?")
-        self._range = (
-            self._port.ask("SL", self._number("SL"), "?"),
-            self._port.ask("SR", self._number("SR"), "?"),
-        )
+        self._stage = self._port.query("ID", str, "?")
+        self._range = (self._setting("SL"), self._setting("SR"))
 
     def identity(self) -> str:
-        """Version of the controller, name of the stage."""
+        """Return the controller's version, the stage's name and the address."""
         return f"Newport {self._port.version}, stage {self._stage}, address {self._port.address}"
 
-    def status(self, patient: bool = True) -> Status:
-        """Position, state, errors."""
-        tries = _TRIES if patient else 1
-        state = self._port.ask("TS", lambda text: framing.state(self._who, text), tries=tries)
-        position = self._port.ask("TP", self._number("TP"), tries=tries)
+    def status(self, retry: bool = True) -> Status:
+        """Read state and errors, then the position."""
+        tries = _TRIES if retry else 1
+        state = self._port.query("TS", lambda text: framing.state(self._who, text), tries=tries)
+        position = self._port.query("TP", self._number("TP"), tries=tries)
         return Status(position, state.moving, state.homed, state.fault)
 
     def close(self) -> None:
-        """Let go of the line."""
-        self._watchdog.end()
+        """Close the line; safe to call twice."""
+        self.watchdog.end()
         self._port.line.close()
 
     def _number(self, letters: str) -> Callable[[str], float]:
         return lambda text: framing.number(self._who, letters, text)
 
+    def _setting(self, letters: str) -> float:
+        return self._port.query(letters, self._number(letters), "?")
+
     def _own_limits_deg(self) -> tuple[float, float]:
         return self._range
 
     def _own_settings(self) -> dict[str, str]:
-        asked = {"speed_deg_per_s": "VA", "acceleration_deg_per_s2": "AC"}
-        found = {n: self._port.ask(way, self._number(way), "?") for n, way in asked.items()}
-        return {name: f"{value:g}" for name, value in found.items()}
+        names = {"speed_deg_per_s": "VA", "acceleration_deg_per_s2": "AC"}
+        return {name: f"{self._setting(letters):g}" for name, letters in names.items()}
 
     def _send_home(self) -> None:
-        self._port.tell("OR")
+        self._port.send("OR")
 
     def _apply_speed(self) -> None:
         for letters, wanted in (
             ("VA", self._limits.speed_deg_per_s),
             ("AC", self._limits.acceleration_deg_per_s2),
         ):
-            self._port.tell(letters, wanted)
-            got = self._port.ask(letters, self._number(letters), "?")
+            self._port.send(letters, wanted)
+            got = self._setting(letters)
             if abs(got - wanted) > 1e-3 * wanted:
                 raise DeviceError(
                     f"{self._who}: {letters} is {got:g} after {wanted:g} was asked for (deg/s, "
@@ -169,7 +168,7 @@ class NewportStage(MotorStage):
                 )
 
     def _send_move(self, angle_deg: float) -> None:
-        self._port.tell("PA", angle_deg)
+        self._port.send("PA", angle_deg)
 
     def _send_stop(self) -> None:
         self._port.stop()

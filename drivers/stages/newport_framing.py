@@ -1,8 +1,8 @@
-"""Newport SMC100 and CONEX-CC: commands and answers as bytes, status words in words.
+"""Framing of Newport's SMC100 and CONEX-CC: commands, answers, states and error codes.
 
-ASCII, one command a line, `{address}{two letters}{value}` and CR LF; a query's answer repeats
-address and letters. A command that sets something does not answer: TE is asked afterwards. From
-the makers' manuals of both controllers (their tables of states differ a little; both are here).
+ASCII, one command per line: `{address}{two letters}{value}` and CR LF. The answer to a query
+repeats address and letters. A command that sets something has no answer: TE is queried after it.
+From the manuals of both controllers; their tables of states differ a little, and both are here.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from drivers.lines.serial_line import Garbled, number_of
 
 END = b"\r\n"
 
-# TE's letters.
+# Letters returned by TE.
 ERRORS = {
     "A": "does not know the command",
     "B": "its address is wrong",
@@ -33,7 +33,7 @@ ERRORS = {
     "V": "it could not carry the command out",
 }
 
-# TS's error bits: what is wrong, and what to look at.
+# Error bits returned by TS: what is wrong, and what to look at.
 FAULTS = {
     0x0200: "80 W output power exceeded: look for what holds the stage",
     0x0100: "motor supply too low: look at the supply's plug and fuse",
@@ -68,24 +68,24 @@ _STATES = {
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """TS taken apart: error bits (0 where all is well) and the state's name."""
+    """Parsed answer to TS: error bits (0 for none) and the name of the state."""
 
     errors: int
     name: str
 
     @property
     def moving(self) -> bool:
-        """Whether the axis is on its way."""
+        """True while the axis moves."""
         return self.name in ("homing", "moving", "jogging")
 
     @property
     def homed(self) -> bool:
-        """Whether the reference is known."""
+        """True if the reference is known."""
         return self.name in ("moving", "ready", "disabled", "jogging")
 
     @property
     def fault(self) -> str:
-        """Why nothing may move, or nothing."""
+        """Reasons that forbid a motion, or an empty text."""
         found = [f"{bit:04X} {text}" for bit, text in FAULTS.items() if self.errors & bit]
         unknown = self.errors & ~sum(FAULTS)
         if unknown:
@@ -98,13 +98,13 @@ class State:
 
 
 def command(address: int, letters: str, value: str | float = "") -> bytes:
-    """One line to the controller: `1PA12.5` and CR LF."""
+    """Return a command line for the controller, such as `1PA12.5` and CR LF."""
     text = value if isinstance(value, str) else f"{value:.6f}".rstrip("0").rstrip(".")
     return f"{address}{letters}{text}".encode("ascii") + END
 
 
 def answer_to(address: int, letters: str, line: bytes) -> str | None:
-    """What an answer to that query says; None where the line is no answer to it."""
+    """Return the value in the answer to a query; None if the line is not its answer."""
     prefix = f"{address}{letters}".encode("ascii")
     if not line.startswith(prefix):
         return None
@@ -116,7 +116,7 @@ def answer_to(address: int, letters: str, line: bytes) -> str | None:
 
 
 def number(who: str, letters: str, text: str) -> float:
-    """The value of an answer, in the stage's unit, finite. Raises `Garbled` where it is none."""
+    """Return the finite number in an answer, in the stage's unit; raise `Garbled` for others."""
     value = number_of(text)
     if value is None:
         raise Garbled(f"{who}: answers {letters} with {text!r}; expected: a number")
@@ -124,7 +124,7 @@ def number(who: str, letters: str, text: str) -> float:
 
 
 def state(who: str, text: str) -> State:
-    """TS's six hexadecimal digits. Raises `Garbled` where they are none, or name no state."""
+    """Parse the six hexadecimal digits of TS; raise `Garbled` for others and unknown states."""
     digits = "0123456789ABCDEF"
     if len(text) != 6 or any(c not in digits for c in text.upper()):
         raise Garbled(f"{who}: answers TS with {text!r}; expected: six hexadecimal digits")
@@ -133,5 +133,5 @@ def state(who: str, text: str) -> State:
         if code in codes:
             return State(int(text[:4], 16), name)
     raise Garbled(
-        f"{who}: answers TS with {text!r}: {text[4:]} is no state that this program knows"
+        f"{who}: answers TS with {text!r}: {text[4:]} is not a state that this program knows"
     )

@@ -1,18 +1,17 @@
-"""A rotary stage behind an Oriental Motor AZ drive: Modbus RTU, or Modbus TCP through a gateway.
+"""Rotary stages behind Oriental Motor's AZ drives: Modbus RTU, or Modbus TCP through a gateway.
 
-No move is ever sent twice on a guess: when the answer to one is lost, the drive is first asked
-whether it has taken it.
+No move is sent twice on a guess. If the answer to one is lost, the drive's registers are read to
+find out whether the move was taken.
 """
 
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from drivers.lines.modbus_bus import Lost, ModbusBus, ModbusUnit, patience
+from drivers.lines.modbus_bus import AnswerLost, ModbusBus, ModbusUnit
 from drivers.lines.modbus_client import BusSettings
 from drivers.lines.serial_line import REPLY_S
 from drivers.stages.motor_stage import POLL_S, STARTS_WITHIN_S, Limits, MotorStage, Status, Stopped
@@ -30,12 +29,12 @@ from drivers.stages.oriental_framing import (
     STOP,
     ZHOME,
     Output,
+    az_mismatch,
     degrees_of,
     direct_data_of,
     move_block,
     output_of,
     steps_of,
-    unlike_az,
     value_of,
 )
 from instrument.clock import Clock
@@ -46,9 +45,9 @@ log = logging.getLogger(__name__)
 _RESYNC_COUNTS = (6, 8, 10, 12, 14)  # of the direct data; no other request here has these lengths
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OrientalSettings:
-    """Where the drive is and what it turns.
+    """Address of a drive, its scale and its limits.
 
     `port`: a serial device's path, or `tcp://host:port` of a gateway. `steps_per_deg` follows from
     the gear and the drive's electronic gear. `current` counts 0.1 %. `reply_s`: seconds.
@@ -76,14 +75,14 @@ class OrientalSettings:
 
     @property
     def bus(self) -> BusSettings:
-        """The line, which other drives may share."""
+        """Settings of the line, which other drives may share."""
         return BusSettings(self.port, self.baudrate, self.parity, self.reply_s)
 
 
 class OrientalStage(MotorStage):
-    """One AZ drive. Drives on one port are given one `bus`, which whoever opened it closes.
+    """One AZ drive. Drives on one port share a `bus`, which is closed by whoever opened it.
 
-    `found`: what its registers said when it was opened.
+    `opening_report` quotes the drive's registers as they were when it was opened.
     """
 
     def __init__(
@@ -91,24 +90,24 @@ class OrientalStage(MotorStage):
     ) -> None:
         super().__init__(name, settings.limits, clock)
         self._settings = settings
-        self._bus = bus or ModbusBus(name, settings.bus)
+        self._bus = bus or ModbusBus(name, settings.bus, clock)
         self._owns_bus = bus is None
         self._drive = ModbusUnit(self._bus, name, settings.unit, DIRECT_DATA, _RESYNC_COUNTS)
         self._stops, self._cleared = 0, -1  # stops sent; how many of them are cleared in 007D
         try:
-            self.found, self._target_steps = self._identify()
+            self.opening_report, self._target_steps = self._identify()
         except BaseException:
             self.close()
             raise
 
     def identity(self) -> str:
-        """What answers: it has no name or serial number, so the unit tells two drives apart."""
+        """Return the drive's kind and its unit address; it has no name or serial number."""
         return f"Oriental Motor AZ drive, by its registers, unit {self._settings.unit}"
 
-    def status(self, patient: bool = True) -> Status:
-        """Where the stage is, by its own feedback, and what its drive says of itself."""
-        until_s = patience() if patient else time.monotonic()
-        output = self._output(until_s)  # before the position: once it stands, that is the last one
+    def status(self, retry: bool = True) -> Status:
+        """Read the output word, then the feedback position."""
+        until_s = self._drive.deadline_s() if retry else self._clock.now_s()
+        output = self._output(until_s)  # first: the position read after it is then one at rest
         return Status(
             degrees_of(self._feedback(until_s), self._settings.steps_per_deg),
             moving=output.has(MOVE),
@@ -117,36 +116,36 @@ class OrientalStage(MotorStage):
         )
 
     def close(self) -> None:
-        """Let go of the line; safe twice."""
-        self._watchdog.end()
+        """Close the line unless it is shared; safe to call twice."""
+        self.watchdog.end()
         if self._owns_bus:
             self._bus.close()
 
     def _own_limits_deg(self) -> tuple[float, float]:
-        """None are known: where an AZ drive keeps its software limits is not in our sources."""
+        """Return infinite limits: the registers of an AZ drive's software limits are not known."""
         return -float("inf"), float("inf")
 
     def _identify(self) -> tuple[str, int]:
-        """What answers, and the target that it holds; refused unless like an AZ drive."""
-        until_s = patience()
+        """Return a report of the registers and the target held; refuse what is no AZ drive."""
+        until_s = self._drive.deadline_s()
         output = self._output(until_s)
         data = direct_data_of(self._drive.read(DIRECT_DATA, DIRECT_DATA_COUNT, until_s))
-        wrong = unlike_az(data, output)
-        if wrong:
+        mismatch = az_mismatch(data, output)
+        if mismatch:
             raise DeviceError(
-                f"{self.name}: {self._drive.where} is no Oriental Motor AZ drive: {wrong}: look at "
-                "the port and the unit address in the rig file"
+                f"{self.name}: {self._drive.where} is no Oriental Motor AZ drive: {mismatch}: look "
+                "at the port and the unit address in the rig file"
             )
         alarm = f"alarm {output.alarm:02X}h" if output.alarm else "no alarm"
         return f"output {output.word:04X} hex, {alarm}, {data}", data.position
 
     def _send_home(self) -> None:
-        self._await_ready("look for its reference")
+        self._wait_until_ready("look for its reference")
         self._set_inputs(ZHOME)
         self._set_inputs(0)
 
     def _apply_speed(self) -> None:
-        """Every move brings its own."""
+        """Do nothing: each move command contains its speed."""
 
     def _send_move(self, angle_deg: float) -> None:
         scale, limits = self._settings.steps_per_deg, self._limits
@@ -157,53 +156,57 @@ class OrientalStage(MotorStage):
             steps_of(limits.acceleration_deg_per_s2, scale),
             self._settings.current,
         )
-        self._await_ready("move")
-        until_s, before = patience(), self._target_steps
-        self._write_once(DIRECT_DATA, block, lambda: self._took(target, before, until_s), until_s)
+        self._wait_until_ready("move")
+        until_s, before = self._drive.deadline_s(), self._target_steps
+
+        def taken() -> bool:
+            return self._move_taken(target, before, until_s)
+
+        self._write_once(DIRECT_DATA, block, taken, until_s)
         self._target_steps = target
 
     def _send_stop(self) -> None:
-        self._stops += 1  # before it is sent: whoever moves next must clear it
+        self._stops += 1  # before it is sent: the next motion must clear it
         try:
             self._drive.write_at_once(INPUT_WORD, STOP)
-        except Lost as lost:
+        except AnswerLost as lost:
             raise type(lost)(f"{lost}; STOP was not acknowledged: it may still move") from lost
 
-    def _await_ready(self, what: str) -> Output:
-        """Take back an earlier stop, and wait until the drive would take a command."""
+    def _wait_until_ready(self, purpose: str) -> None:
+        """Clear an earlier stop, and wait until the drive accepts commands."""
         stops = self._stops
         if self._cleared != stops:
             self._set_inputs(0)
             self._cleared = stops
         begun_s = self._clock.now_s()
-        while not (output := self._output(patience())).has(READY):
-            self._refuse_stopped()
+        while not (output := self._output(self._drive.deadline_s())).has(READY):
+            self._raise_if_stopped()
             if output.fault:
                 raise DeviceError(f"{self.name}: {output.fault}")
             if self._clock.now_s() - begun_s > STARTS_WITHIN_S:
                 raise DeviceError(
-                    f"{self.name}: its drive is not ready to {what} (output {output.word:04X} hex, "
-                    "READY is bit 5): look at its motor's supply, and at its STOP and FREE inputs"
+                    f"{self.name}: its drive is not ready to {purpose} (output {output.word:04X} "
+                    "hex, READY is bit 5): look at its motor's supply, and at its STOP and FREE "
+                    "inputs"
                 )
             self._clock.sleep(POLL_S)
-        return output
 
     def _set_inputs(self, word: int) -> None:
-        """Set the input word; setting it to what it is already makes no edge and starts nothing."""
-        until_s = patience()
+        """Set the input word; setting the same word again makes no edge and starts nothing."""
+        until_s = self._drive.deadline_s()
 
         def taken() -> bool:
             return self._drive.read(INPUT_WORD, 1, until_s) == [word]
 
         self._write_once(INPUT_WORD, (word,), taken, until_s)
 
-    def _took(self, target: int, before: int, until_s: float) -> bool:
-        """Whether a move whose answer was lost was executed; asks until it is known."""
+    def _move_taken(self, target: int, before: int, until_s: float) -> bool:
+        """Return True if a move whose answer was lost has been executed."""
         data = direct_data_of(self._drive.read(DIRECT_DATA, DIRECT_DATA_COUNT, until_s))
         self._target_steps = data.position
         if data.position != target or before != target:
             return data.position == target
-        # The same target as before: only what the stage does can tell.
+        # The target is the previous one: only motion or arrival shows that the move was taken.
         if self._output(until_s).has(MOVE):
             return True
         allowed = self._limits.tolerance_deg * self._settings.steps_per_deg
@@ -212,28 +215,28 @@ class OrientalStage(MotorStage):
     def _write_once(
         self, register: int, values: tuple[int, ...], taken: Callable[[], bool], until_s: float
     ) -> None:
-        """Write; after a lost answer find out whether it was taken, and if not write once more."""
+        """Write; after a lost answer ask `taken`, and write once more only if it was not."""
         for last in (False, True):
             try:
-                return self._drive.write(register, values, until_s, self._refuse_stopped)
-            except Lost as lost:
+                return self._drive.write(register, values, until_s, self._raise_if_stopped)
+            except AnswerLost as lost:
                 log.warning("%s", lost)
-                if self._known_taken(taken, lost):
+                if self._confirm(taken, lost):
                     return None
-                if last or time.monotonic() > until_s:
+                if last or self._clock.now_s() > until_s:
                     raise
         return None
 
-    def _known_taken(self, taken: Callable[[], bool], lost: DeviceError) -> bool:
+    def _confirm(self, taken: Callable[[], bool], lost: DeviceError) -> bool:
         try:
             return taken()
-        except Lost as worse:
+        except AnswerLost as worse:
             raise type(worse)(
                 f"{worse} (before: {lost}); whether the drive has taken its last command is not "
                 "known: it may move"
             ) from worse
 
-    def _refuse_stopped(self) -> None:
+    def _raise_if_stopped(self) -> None:
         if self._stopped:
             raise Stopped(f"{self.name}: stopped before it began to move")
 

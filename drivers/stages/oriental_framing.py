@@ -1,7 +1,7 @@
-"""What an Oriental Motor AZ drive is told and says: registers, words and steps, without a line.
+"""Framing of Oriental Motor's AZ drives: registers, bits, alarms, and steps as 32-bit values.
 
 Registers, bits and alarms are those of the maker's AZ function manual (Modbus RTU, direct data
-operation). A 32-bit value lies in two registers, the high word first.
+operation). A 32-bit value takes two registers, the high word first.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from instrument.errors import DeviceError
 
 DIRECT_DATA = 0x0058  # the first of the 16 registers of a direct data operation
 DIRECT_DATA_COUNT = 16
-TARGET = 0x005C  # where in that block the position is
+TARGET = 0x005C  # the target position, in that block
 INPUT_WORD = 0x007D  # driver input command, low word
 OUTPUT = 0x007E  # driver output status, 2 registers; the alarm code's 2 follow it at 0080
 OUTPUT_AND_ALARM_COUNT = 4
-FEEDBACK_POSITION = 0x00CC  # 2 registers, steps; 00C6 would be where it was told to be
+FEEDBACK_POSITION = 0x00CC  # 2 registers, steps; 00C6 would be the commanded position
 
 # Input word, 007D.
 ZHOME = 1 << 4
@@ -43,7 +43,7 @@ _ALARMS = {
 
 @dataclass(frozen=True, slots=True)
 class DirectData:
-    """What a direct data operation says: steps, Hz (steps/s), steps/s², 0.1 % of the current."""
+    """Registers of a direct data operation: steps, Hz (steps/s), steps/s², 0.1 % of the current."""
 
     number: int
     kind: int
@@ -63,37 +63,37 @@ class DirectData:
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """What 007E to 0081 say: the output word and the alarm code, 0 for none."""
+    """Registers 007E to 0081: the output word and the alarm code, 0 for none."""
 
     word: int
     alarm: int
 
     @property
     def fault(self) -> str:
-        """Empty, or the alarm and what to look at."""
+        """The alarm and what to look at, or an empty text."""
         return alarm_text(self.alarm) if self.alarm or self.word & ALM else ""
 
     def has(self, bit: int) -> bool:
-        """Whether a bit of the output word is on."""
+        """True if a bit of the output word is set."""
         return bool(self.word & bit)
 
 
 def words_of(value: int) -> tuple[int, int]:
-    """A signed 32-bit value as two registers, the high word first."""
+    """Split a signed 32-bit value into two registers, the high word first."""
     if not _LOW32 <= value <= _HIGH32:
         raise DeviceError(f"{value} does not fit a 32-bit register ({_LOW32} to {_HIGH32})")
     return (value >> 16) & 0xFFFF, value & 0xFFFF
 
 
 def value_of(words: Sequence[int]) -> int:
-    """The signed 32-bit value in two registers, the high word first."""
+    """Return the signed 32-bit value in two registers, the high word first."""
     high, low = words
     value = high << 16 | low
     return value - (1 << 32) if value > _HIGH32 else value
 
 
 def steps_of(angle_deg: float, steps_per_deg: float) -> int:
-    """An angle in degrees as whole steps."""
+    """Convert an angle in degrees to whole steps."""
     steps = angle_deg * steps_per_deg
     if not (math.isfinite(steps) and _LOW32 <= round(steps) <= _HIGH32):
         raise DeviceError(
@@ -104,20 +104,20 @@ def steps_of(angle_deg: float, steps_per_deg: float) -> int:
 
 
 def degrees_of(steps: int, steps_per_deg: float) -> float:
-    """Steps as degrees."""
+    """Convert steps to degrees."""
     return steps / steps_per_deg
 
 
 def move_block(
     position_steps: int, speed_hz: int, acceleration: int, current: int = FULL_CURRENT
 ) -> tuple[int, ...]:
-    """The 16 registers from 0058 that start an absolute move.
+    """Return the 16 registers from 0058 that start an absolute move.
 
-    `speed_hz` in steps/s. `acceleration` counts 0.001 kHz/s, which is 1 step/s²: so say four
-    independent open drivers of AZ drives, and the maker's example fits (05DC hex = 1.5 kHz/s to
-    reach 2000 Hz). It holds for a drive whose parameter "acceleration/deceleration unit" is left
-    at the maker's setting, kHz/s; s and ms/kHz are its other two, and no register known here
-    tells which. A wrong one shows as ramps that are too long or short, never as a wrong angle.
+    `speed_hz` is in steps/s. `acceleration` counts 0.001 kHz/s, which is 1 step/s²: four
+    independent open drivers of AZ drives use this unit, and the maker's example agrees (05DC hex =
+    1.5 kHz/s to reach 2000 Hz). It requires the drive's parameter "acceleration/deceleration unit"
+    at its default, kHz/s. The others are s and ms/kHz, and no register known here shows which is
+    set. With a wrong unit the ramps are too long or too short, but the angle is right.
     """
     parts = (
         0, ABSOLUTE, position_steps, max(speed_hz, 1), max(acceleration, 1), max(acceleration, 1),
@@ -127,27 +127,27 @@ def move_block(
 
 
 def direct_data_of(words: Sequence[int]) -> DirectData:
-    """What the 16 registers from 0058 say."""
+    """Parse the 16 registers from 0058."""
     pairs = zip(words[::2], words[1::2], strict=True)
     return DirectData(*(value_of(pair) for pair in pairs))
 
 
 def output_of(words: Sequence[int]) -> Output:
-    """What the 4 registers from 007E say."""
+    """Parse the 4 registers from 007E."""
     return Output(words[1], value_of(words[2:4]))
 
 
 def alarm_text(code: int) -> str:
-    """An alarm with its meaning and what to look at."""
+    """Return an alarm with its meaning and what to look at."""
     meaning, look = _ALARMS.get(code, ("not known here", "look it up in the AZ drive's manual"))
     return f"alarm {code:02X}h ({meaning}): {look}, then switch the drive off and on"
 
 
-def unlike_az(data: DirectData, output: Output) -> str:
-    """Why the answers cannot be an AZ drive's, or nothing.
+def az_mismatch(data: DirectData, output: Output) -> str:
+    """Return a reason why the answers cannot be an AZ drive's, or an empty text.
 
-    No register with a name or serial number is known: what can be told is that all answers keep
-    to the ranges of an AZ drive.
+    No register with a name or serial number is known, so the values are checked against the ranges
+    of an AZ drive.
     """
     if not 0 <= output.alarm <= 0xFF:
         return f"alarm code {output.alarm:X} hex (an AZ drive's are 00 to FF)"

@@ -1,72 +1,74 @@
-"""Ends a motion of which nothing was heard for too long, whatever else the program is busy with."""
+"""Watchdog that stops a stage which moves without a status report for too long."""
 
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from typing import TypeVar
 
-SILENT_S = 0.5  # a status older than this is no status
+from instrument.clock import Clock
+
+SILENT_S = 0.5  # a status older than this is out of date
 _TICK_S = 0.02
-_GLANCE_AFTER_S, _GLANCE_BEFORE_S = 0.1, 0.3  # it must have failed before the time is up
+_PROBE_AFTER_S, _PROBE_BEFORE_S = 0.1, 0.3  # a probe must have failed before the time is up
 
 T = TypeVar("T")
 
 
 class Watchdog:
-    """One thread for as long as something moves.
+    """One thread that runs while something moves.
 
-    Whoever asks for the status does so with `hear`; while nobody does, `glance` asks, once and
-    without patience, and says whether there was an answer. Where neither has had one for
-    `SILENT_S`, `stop` is called. Neither may raise.
+    The program reads the status through `poll`. While nobody polls, the thread calls `probe`,
+    which asks once, without retries, and returns True for an answer. After `SILENT_S` without an
+    answer to either, the thread calls `stop`. Neither `probe` nor `stop` may raise.
     """
 
-    def __init__(self, name: str, glance: Callable[[], bool], stop: Callable[[], None]) -> None:
-        self._name, self._glance, self._stop = name, glance, stop
+    def __init__(
+        self, name: str, probe: Callable[[], bool], stop: Callable[[], None], clock: Clock
+    ) -> None:
+        self._name, self._probe, self._stop, self._clock = name, probe, stop, clock
         self._asking = threading.Lock()
         self._over = threading.Event()
         self._over.set()
-        self._heard_s = 0.0
+        self._answered_s = 0.0
         self.fired = False
 
     def begin(self) -> None:
-        """Something is about to move."""
+        """Start to watch, just before a motion."""
         self.end()
-        self.fired, self._heard_s = False, time.monotonic()
+        self.fired, self._answered_s = False, self._clock.now_s()
         self._over = threading.Event()
         threading.Thread(
             target=self._watch, args=(self._over,), name=f"watchdog {self._name}", daemon=True
         ).start()
 
     def end(self) -> None:
-        """It stands, or was told to stop."""
+        """Stop watching: the motion has ended, or was told to."""
         self._over.set()
 
-    def hear(self, ask: Callable[[], T]) -> T:
-        """Ask for the status; an answer is a sign of life."""
+    def poll(self, read_status: Callable[[], T]) -> T:
+        """Return the status; an answer restarts the time allowed."""
         with self._asking:
-            answer = ask()
-            self._heard_s = time.monotonic()
-            return answer
+            status = read_status()
+            self._answered_s = self._clock.now_s()
+            return status
 
     def _watch(self, over: threading.Event) -> None:
         while not over.wait(_TICK_S):
-            silent_s = time.monotonic() - self._heard_s
+            silent_s = self._clock.now_s() - self._answered_s
             if silent_s > SILENT_S:
                 self.fired = True
                 over.set()
                 self._stop()
                 return
-            if _GLANCE_AFTER_S < silent_s < _GLANCE_BEFORE_S:
-                self._look()
+            if _PROBE_AFTER_S < silent_s < _PROBE_BEFORE_S:
+                self._probe_unless_polled()
 
-    def _look(self) -> None:
-        """Where somebody else is asking, their answer will do."""
+    def _probe_unless_polled(self) -> None:
         if not self._asking.acquire(blocking=False):
             return
         try:
-            if self._glance():
-                self._heard_s = time.monotonic()
+            if self._probe():
+                self._answered_s = self._clock.now_s()
         finally:
             self._asking.release()

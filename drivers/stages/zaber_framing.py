@@ -1,8 +1,8 @@
-"""Zaber's ASCII protocol: commands and replies as bytes, warning flags in words.
+"""Framing of Zaber's ASCII protocol: commands, replies, checksums and warning flags.
 
-`/{device} {axis} {id} command:CC` and CR LF; reply `@01 1 id OK IDLE -- data:CC`. CC is the two's
-complement of the sum of the bytes between the lead character and the colon. Alerts begin with `!`,
-information with `#`. From the maker's protocol manual.
+A command is `/{device} {axis} {id} command:CC` and CR LF, a reply `@01 1 id OK IDLE -- data:CC`. CC
+is the two's complement of the sum of the bytes between the lead character and the colon. Alerts
+begin with `!`, information with `#`. From the maker's protocol manual.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ END = b"\r\n"
 IDS = 100  # message ids run from 00 to 99
 SPEED_PER_MICROSTEP = 1.6384  # speed data for one microstep a second
 
-# Warning flags that begin with F: faults, by the maker's list, and what to look at.
+# Faults, the warning flags that begin with F, from the maker's list, and what to look at.
 FAULTS = {
     "FF": "critical system error: switch it off and on; if it stays, ask the maker",
     "FN": "peripheral not supported: look at which stage is plugged in",
@@ -42,9 +42,9 @@ NOT_HOMED = ("WH", "WR")  # WH: not homed yet; WR: no reference position
 _REPLY = re.compile(rb"@(\d\d) (\d) (?:(\d\d) )?(OK|RJ) (IDLE|BUSY) ([!-~]{2}) ?([ -9;-~]*)")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reply:
-    """A reply taken apart; `warning` is the most urgent one."""
+    """Parsed reply; `warning` is the most urgent one."""
 
     device: int
     axis: int
@@ -56,32 +56,32 @@ class Reply:
 
 
 def homed(flags: Sequence[str]) -> bool:
-    """Whether a device with these warning flags knows where it is."""
+    """True unless a warning flag says that the reference is missing."""
     return not any(flag in NOT_HOMED for flag in flags)
 
 
 def fault(flags: Sequence[str]) -> str:
-    """Why nothing may move, or nothing."""
+    """Return the faults among warning flags, or an empty text."""
     unknown = "a fault that this program does not know: see the manual"
     return "; ".join(f"{f} {FAULTS.get(f, unknown)}" for f in flags if f.startswith("F"))
 
 
 def checksum(body: bytes) -> bytes:
-    """Two hexadecimal digits for the bytes between the lead character and the colon."""
+    """Return two hexadecimal digits for the bytes between the lead character and the colon."""
     return b"%02X" % (-sum(body) & 0xFF)
 
 
 def command(device: int, axis: int, message_id: int, text: str) -> bytes:
-    """One line to the device: `/1 1 07 move abs 10000:CC` and CR LF."""
+    """Return a command line for the device: `/1 1 07 move abs 10000:CC` and CR LF."""
     body = f"{device} {axis} {message_id:02d} {text}".encode("ascii")
     return b"/" + body + b":" + checksum(body) + END
 
 
 def reply_of(line: bytes) -> Reply | None:
-    """A line taken apart; None where it is no whole reply: an alert, noise, a wrong checksum.
+    """Parse a line; None for alerts, noise, and replies with a wrong checksum.
 
-    The checksum finds any one byte that is wrong, and lets one in 256 of larger damages pass; two
-    bytes that have changed places have the same sum.
+    The checksum finds any single wrong byte and misses one in 256 of larger errors. Two exchanged
+    bytes have the same sum.
     """
     body, colon, check = line.partition(b":")
     if not colon or check.upper() != checksum(body[1:]):
@@ -91,11 +91,11 @@ def reply_of(line: bytes) -> Reply | None:
         return None
     device, axis, number, flag, status, warning, data = found.groups()
     return Reply(
-        int(device),
-        int(axis),
-        None if number is None else int(number),
-        flag == b"OK",
-        status == b"BUSY",
-        warning.decode("ascii"),
-        data.decode("ascii").strip(),
+        device=int(device),
+        axis=int(axis),
+        message_id=None if number is None else int(number),
+        accepted=flag == b"OK",
+        busy=status == b"BUSY",
+        warning=warning.decode("ascii"),
+        data=data.decode("ascii").strip(),
     )

@@ -20,7 +20,7 @@ from sim.clock import SimulatedClock
 from sim.scene.scene import Scene
 from sim.scene.stage import SimulatedStage
 from tests.support.paths import CONFIGS
-from tests.support.stages.emulated_benches import BENCHES
+from tests.support.stages.emulated_stages import EMULATED_STAGES
 
 pytestmark = pytest.mark.waits
 
@@ -61,7 +61,7 @@ def real(config: pytest.Config) -> Iterator[Stage]:
             stage.stop()
 
 
-@pytest.fixture(params=["simulated", *BENCHES, pytest.param("real", marks=pytest.mark.hil)])
+@pytest.fixture(params=["simulated", *EMULATED_STAGES, pytest.param("real", marks=pytest.mark.hil)])
 def stage(request: pytest.FixtureRequest) -> Iterator[Stage]:
     if request.param == "simulated":
         with simulated() as stage:
@@ -72,7 +72,7 @@ def stage(request: pytest.FixtureRequest) -> Iterator[Stage]:
         with real(request.config) as stage:
             yield stage
     else:
-        with BENCHES[request.param]() as bench:
+        with EMULATED_STAGES[request.param]() as bench:
             yield bench.stage
 
 

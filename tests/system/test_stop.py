@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from tests.support.paths import ROOT
-from tests.support.stages.emulated_benches import BENCHES
+from tests.support.stages.emulated_stages import EMULATED_STAGES
 
 # A half-duplex line may still owe an answer: then one reply time-out more.
 BOUND_S = {"newport": 0.1, "zaber": 0.1, "oriental rtu": 0.3, "oriental tcp": 0.3}
@@ -17,7 +17,7 @@ BOUND_S = {"newport": 0.1, "zaber": 0.1, "oriental rtu": 0.3, "oriental tcp": 0.
 HOWS = {"SIGINT": "KeyboardInterrupt", "SIGTERM": "KeyboardInterrupt", "exception": "DeviceError"}
 
 
-@pytest.mark.parametrize("bench", list(BENCHES))
+@pytest.mark.parametrize("bench", list(EMULATED_STAGES))
 def test_a_stop_is_on_the_wire_in_time(bench: str) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "tests.support.stages.stop_child", bench, *HOWS],

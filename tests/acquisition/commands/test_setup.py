@@ -208,9 +208,9 @@ def at_terminal(arguments: list[object], replies: dict[str, str], until: str) ->
 
 
 def test_nothing_real_moves_before_somebody_has_said_so(real_rig: Path) -> None:
-    from tests.support.stages.emulated_benches import newport
+    from tests.support.stages.emulated_stages import emulated
 
-    with newport() as bench:
+    with emulated("newport") as bench:
         text = real_rig.read_text().replace("/dev/nowhere", str(bench.wire.port))
         real_rig.write_text(text)
         bench.stage.close()

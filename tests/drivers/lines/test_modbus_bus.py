@@ -16,15 +16,16 @@ from drivers.lines.serial_line import NoReply, PortGone
 from drivers.stages.motor_stage import Stopped
 from drivers.stages.oriental import OrientalStage
 from drivers.stages.oriental_framing import value_of
+from instrument.clock import SystemClock
 from instrument.errors import DeviceError
 from sim.emulated.wire import Fault
-from tests.support.stages.oriental_bench import (
-    KINDS,
+from tests.support.stages.emulated_az_drive import (
     SLOW,
     SLOW_LIMITS,
     STEPS_PER_DEG,
-    Bench,
-    bench,
+    WIRES,
+    EmulatedDrive,
+    emulated_drive,
 )
 
 pytestmark = pytest.mark.waits
@@ -46,7 +47,7 @@ TARGET = 8.0
 T = TypeVar("T")
 
 
-def _moved(at: Bench, stage: OrientalStage) -> float:
+def _moved(at: EmulatedDrive, stage: OrientalStage) -> float:
     stage.start_move(TARGET)
     return stage.wait()
 
@@ -54,9 +55,9 @@ def _moved(at: Bench, stage: OrientalStage) -> float:
 @pytest.mark.parametrize(("kind", "after"), [("pty", 0), ("tcp", 2)])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_opening(kind: str, fault: str, after: int) -> None:
-    with bench(kind, reply_s=REPLY_S) as at:
+    with emulated_drive(kind, reply_s=REPLY_S) as at:
         at.wire.inject(*[None] * after, FAULTS[fault])
-        told = _outcome(fault, lambda: at.open().found)
+        told = _outcome(fault, lambda: at.open().opening_report)
         assert told is None or "output 4020 hex, no alarm" in told
         assert at.wire.pending == 0
 
@@ -64,7 +65,7 @@ def test_opening(kind: str, fault: str, after: int) -> None:
 @pytest.mark.parametrize(("kind", "after"), [("pty", 0), ("tcp", 1)])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_reading_the_status(kind: str, fault: str, after: int) -> None:
-    with bench(kind, reply_s=REPLY_S) as at:
+    with emulated_drive(kind, reply_s=REPLY_S) as at:
         stage = at.homed()
         at.motor.move(TARGET)
         _until(lambda: not at.motor.moving)
@@ -77,7 +78,7 @@ def test_reading_the_status(kind: str, fault: str, after: int) -> None:
 @pytest.mark.parametrize(("kind", "again"), [("pty", False), ("pty", True), ("tcp", False)])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_writing_a_move(kind: str, fault: str, again: bool) -> None:
-    with bench(kind, reply_s=REPLY_S) as at:
+    with emulated_drive(kind, reply_s=REPLY_S) as at:
         stage, moves = at.homed(), 1
         if again:  # the drive holds the same target already, and stands elsewhere
             assert _moved(at, stage) == TARGET
@@ -94,10 +95,10 @@ def test_writing_a_move(kind: str, fault: str, again: bool) -> None:
         assert sent == (2 if fault == "lose request" else 1)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", WIRES)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_waiting(kind: str, fault: str) -> None:
-    with bench(kind, reply_s=REPLY_S) as at:
+    with emulated_drive(kind, reply_s=REPLY_S) as at:
         stage = at.homed()
         stage.start_move(TARGET)
         at.wire.inject(None, FAULTS[fault])
@@ -109,7 +110,7 @@ def test_waiting(kind: str, fault: str) -> None:
 @pytest.mark.parametrize("kind", ["pty"])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_homing(kind: str, fault: str) -> None:
-    with bench(kind, reply_s=REPLY_S) as at:
+    with emulated_drive(kind, reply_s=REPLY_S) as at:
         stage = at.open()
         since = len(at.wire.seen)
         at.wire.inject(None, None, None, None, FAULTS[fault])  # after the input word and READY
@@ -126,7 +127,7 @@ def test_homing(kind: str, fault: str) -> None:
     [("pty", name) for name in FAULTS] + [("tcp", name) for name in ("late", "nul", "unplug")],
 )
 def test_stopping(kind: str, fault: str) -> None:
-    with bench(kind, reply_s=2 * REPLY_S) as at:
+    with emulated_drive(kind, reply_s=2 * REPLY_S) as at:
         stage = at.homed()
         at.motor.move(-170.0)
         at.wire.inject(replace(FAULTS[fault], seconds=2 * FAULTS[fault].seconds))
@@ -145,7 +146,7 @@ def test_stopping(kind: str, fault: str) -> None:
 @pytest.mark.parametrize("first", ["late", "truncate", "lose request"])
 @pytest.mark.parametrize("second", ["drop", "later than the quiet"])
 def test_two_faults_in_a_row_at_a_move(kind: str, first: str, second: str) -> None:
-    with bench(kind, reply_s=REPLY_S) as at:
+    with emulated_drive(kind, reply_s=REPLY_S) as at:
         stage = at.homed()
         at.wire.inject(None, None, None, FAULTS[first], FAULTS[second])
         assert _outcome("", lambda: _moved(at, stage)) == TARGET
@@ -153,7 +154,7 @@ def test_two_faults_in_a_row_at_a_move(kind: str, first: str, second: str) -> No
 
 
 def test_a_line_that_dies_at_a_move_says_that_it_may_move() -> None:
-    with bench("pty") as at:
+    with emulated_drive("pty") as at:
         stage = at.homed()
         at.wire.inject(None, None, None, *[Fault("drop")] * 9)
         begun_s = time.monotonic()
@@ -164,7 +165,7 @@ def test_a_line_that_dies_at_a_move_says_that_it_may_move() -> None:
 
 
 def test_a_stop_forbids_the_second_try_of_a_lost_move() -> None:
-    with bench("pty") as at:
+    with emulated_drive("pty") as at:
         stage, told = at.homed(), []
         since = len(at.wire.seen)
         at.wire.inject(None, None, None, Fault("lose request"))
@@ -186,13 +187,15 @@ def test_a_stop_forbids_the_second_try_of_a_lost_move() -> None:
 @pytest.mark.parametrize("late", [1.5, 2.4, 4.0])
 def test_a_late_answer_is_never_taken_for_anothers(late: float) -> None:
     """Command and feedback position are alike in shape: only waiting tells their answers apart."""
-    with bench("pty", SLOW, SLOW_LIMITS) as at:
+    with emulated_drive("pty", SLOW, SLOW_LIMITS) as at:
         stage = at.homed()
         stage.start_move(90.0)
         at.motor.hold()
         held = round(at.motor.position_deg * STEPS_PER_DEG)
         stage.close()
-        with ModbusBus("line", BusSettings(at.port, parity="N", reply_s=REPLY_S)) as bus:
+        with ModbusBus(
+            "line", BusSettings(at.port, parity="N", reply_s=REPLY_S), SystemClock()
+        ) as bus:
             unit = ModbusUnit(bus, "line", 1, 0x58, (6, 8, 10, 12, 14))
             at.wire.inject(None, Fault("late", late * REPLY_S))
             for _ in range(3):

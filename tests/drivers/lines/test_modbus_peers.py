@@ -21,9 +21,9 @@ from pathlib import Path
 
 import pytest
 
-from drivers.lines.modbus_bus import ModbusBus, ModbusUnit, patience
+from drivers.lines.modbus_bus import ModbusBus, ModbusUnit
 from drivers.lines.modbus_client import BusSettings
-from drivers.stages.oriental import OrientalSettings, OrientalStage
+from drivers.stages.oriental import OrientalStage
 from drivers.stages.oriental_framing import (
     DIRECT_DATA,
     DIRECT_DATA_COUNT,
@@ -40,7 +40,7 @@ from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway
 from sim.emulated.motor import Motor
 from sim.emulated.oriental_controller import OrientalController
 from sim.emulated.wire import PtyWire, TcpWire
-from tests.support.stages.oriental_bench import FAST, LIMITS
+from tests.support.stages.emulated_az_drive import FAST, az_settings
 
 pytestmark = pytest.mark.waits
 
@@ -110,17 +110,17 @@ def _mbpoll(wire: PtyWire | TcpWire, register: int, *values: str, count: int) ->
 def _our_line_asks(port: str) -> None:
     """Read, write in both ways and read back, and take a refusal as one."""
     settings = BusSettings(port, parity="N", reply_s=0.4)
-    with ModbusBus("peer", settings) as bus:
+    with ModbusBus("peer", settings, SystemClock()) as bus:
         unit = ModbusUnit(bus, "peer", 1, DIRECT_DATA, (6, 8, 10))
         assert value_of(unit.read(FEEDBACK_POSITION, 2)) == 8500
-        unit.write(DIRECT_DATA, move_block(TARGET_STEPS, 2000, 1500), patience())
+        unit.write(DIRECT_DATA, move_block(TARGET_STEPS, 2000, 1500), unit.deadline_s())
         back = direct_data_of(unit.read(DIRECT_DATA, DIRECT_DATA_COUNT))
         assert (back.position, back.speed_hz, back.trigger) == (TARGET_STEPS, 2000, 1)
         unit.write_at_once(INPUT_WORD, STOP)
         assert unit.read(INPUT_WORD, 1) == [STOP]
         with pytest.raises(DeviceError, match=r"register 1000 hex .* exception 02"):
             unit.read(0x1000, 1)
-        unit.write(0xFF, [1], patience())
+        unit.write(0xFF, [1], unit.deadline_s())
 
 
 def test_our_line_asks_a_libmodbus_slave(tmp_path: Path) -> None:
@@ -217,11 +217,11 @@ def test_our_line_asks_a_pymodbustcp_slave() -> None:
 def test_a_foreign_slave_is_no_az_drive(tmp_path: Path) -> None:
     with _two_ended() as (theirs, ours):
         running = subprocess.Popen([_compiled(tmp_path), theirs, "1"])
-        settings = OrientalSettings(ours, 100.0, LIMITS, parity="N")
+        settings = az_settings(ours)
         try:
-            with ModbusBus("peer", settings.bus) as bus:
+            with ModbusBus("peer", settings.bus, SystemClock()) as bus:
                 unit = ModbusUnit(bus, "peer", 1, DIRECT_DATA, (6, 8))
-                unit.write(DIRECT_DATA + 1, [999], patience())
+                unit.write(DIRECT_DATA + 1, [999], unit.deadline_s())
             with pytest.raises(DeviceError, match="is no Oriental Motor AZ drive: data number 999"):
                 OrientalStage("theta_r", settings, SystemClock())
         finally:

@@ -14,7 +14,7 @@ import pytest
 from drivers.lines.serial_line import Garbled, NoReply, PortGone
 from instrument.errors import DeviceError
 from sim.emulated.wire import Fault
-from tests.support.stages.emulated_benches import BENCHES, MECHANICS, SLOW, Bench
+from tests.support.stages.emulated_stages import EMULATED_STAGES, MECHANICS, SLOW, EmulatedStage
 
 pytestmark = pytest.mark.waits
 
@@ -42,33 +42,33 @@ FOR_GOOD = {
 
 
 # How the AZ's faults look through a gateway is in `test_oriental_faults`.
-SERIAL = [name for name in BENCHES if name != "oriental tcp"]
+SERIAL = [name for name in EMULATED_STAGES if name != "oriental tcp"]
 
 
 @pytest.fixture(params=SERIAL)
-def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    with BENCHES[request.param](MECHANICS) as bench:
+def bench(request: pytest.FixtureRequest) -> Iterator[EmulatedStage]:
+    with EMULATED_STAGES[request.param](MECHANICS) as bench:
         bench.stage.home()
         bench.stage.start_move(10.0)
         bench.stage.wait()
         yield bench
 
 
-def read(bench: Bench) -> float:
+def read(bench: EmulatedStage) -> float:
     return bench.stage.position_deg()
 
 
-def move(bench: Bench) -> float:
+def move(bench: EmulatedStage) -> float:
     bench.stage.start_move(-40.0)
     return bench.stage.wait()
 
 
-def home(bench: Bench) -> float:
+def home(bench: EmulatedStage) -> float:
     bench.stage.home()
     return bench.stage.position_deg()
 
 
-ACTIONS: dict[str, tuple[Callable[[Bench], float], float]] = {
+ACTIONS: dict[str, tuple[Callable[[EmulatedStage], float], float]] = {
     "read": (read, 10.0),
     "move": (move, -40.0),
     "home": (home, 0.0),
@@ -78,7 +78,9 @@ ACTIONS: dict[str, tuple[Callable[[Bench], float], float]] = {
 @pytest.mark.parametrize("answer", [0, 1, 3])
 @pytest.mark.parametrize("fault", ONCE)
 @pytest.mark.parametrize("action", ACTIONS)
-def test_one_spoilt_answer_is_got_over(bench: Bench, action: str, fault: str, answer: int) -> None:
+def test_one_spoilt_answer_is_got_over(
+    bench: EmulatedStage, action: str, fault: str, answer: int
+) -> None:
     """Whichever answer it is: to the status, to the command, to what asks after it."""
     act, expected = ACTIONS[action]
     moves = bench.moves()
@@ -92,7 +94,9 @@ def test_one_spoilt_answer_is_got_over(bench: Bench, action: str, fault: str, an
 
 @pytest.mark.parametrize("fault", FOR_GOOD)
 @pytest.mark.parametrize("action", ACTIONS)
-def test_a_line_that_stays_bad_is_named_in_time(bench: Bench, action: str, fault: str) -> None:
+def test_a_line_that_stays_bad_is_named_in_time(
+    bench: EmulatedStage, action: str, fault: str
+) -> None:
     act, _ = ACTIONS[action]
     spoilt, error = FOR_GOOD[fault]
     moves = bench.moves()
@@ -107,7 +111,9 @@ def test_a_line_that_stays_bad_is_named_in_time(bench: Bench, action: str, fault
 
 
 @pytest.mark.parametrize("answer", range(4))
-def test_a_line_that_goes_bad_during_a_move_ends_it_in_time(bench: Bench, answer: int) -> None:
+def test_a_line_that_goes_bad_during_a_move_ends_it_in_time(
+    bench: EmulatedStage, answer: int
+) -> None:
     bench.wire.inject(*[None] * answer, *[Fault("drop")] * 200)
     begun_s = time.monotonic()
     with pytest.raises(NoReply, match="theta_r"):
@@ -115,7 +121,7 @@ def test_a_line_that_goes_bad_during_a_move_ends_it_in_time(bench: Bench, answer
     assert time.monotonic() - begun_s < BOUND_S
 
 
-def test_a_late_answer_is_never_taken_for_another_s(bench: Bench) -> None:
+def test_a_late_answer_is_never_taken_for_another_s(bench: EmulatedStage) -> None:
     """Position asked while it comes late, then moved, then asked again, over and over."""
     for angle_deg in (20.0, -20.0, 30.0):
         bench.wire.inject(Fault("late", 0.4))
@@ -126,7 +132,7 @@ def test_a_late_answer_is_never_taken_for_another_s(bench: Bench) -> None:
 
 
 def test_a_stop_goes_out_while_an_answer_is_owed() -> None:
-    for make in BENCHES.values():
+    for make in EMULATED_STAGES.values():
         with make(SLOW) as bench:
             bench.stage.home()
             bench.stage.start_move(70.0)
@@ -146,7 +152,7 @@ def test_a_stop_goes_out_while_an_answer_is_owed() -> None:
             asking.join(BOUND_S)
 
 
-def _ask(bench: Bench) -> None:
+def _ask(bench: EmulatedStage) -> None:
     try:
         bench.stage.position_deg()
     except DeviceError:

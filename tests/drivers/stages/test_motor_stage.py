@@ -24,7 +24,13 @@ from sim.clock import SimulatedClock
 from sim.emulated.motor import Motor
 from sim.emulated.wire import PtyWire
 from sim.emulated.zaber_controller import MICROSTEPS_PER_DEG, ZaberController
-from tests.support.stages.emulated_benches import BENCHES, LIMITS, MECHANICS, SLOW, Bench
+from tests.support.stages.emulated_stages import (
+    EMULATED_STAGES,
+    LIMITS,
+    MECHANICS,
+    SLOW,
+    EmulatedStage,
+)
 
 pytestmark = pytest.mark.waits
 
@@ -39,30 +45,30 @@ def until(condition: Callable[[], bool]) -> None:
         time.sleep(0.001)
 
 
-@pytest.fixture(params=list(BENCHES))
-def make(request: pytest.FixtureRequest) -> Callable[..., AbstractContextManager[Bench]]:
-    return BENCHES[request.param]
+@pytest.fixture(params=list(EMULATED_STAGES))
+def make(request: pytest.FixtureRequest) -> Callable[..., AbstractContextManager[EmulatedStage]]:
+    return EMULATED_STAGES[request.param]
 
 
 @pytest.fixture
-def bench(make: Callable[..., AbstractContextManager[Bench]]) -> Iterator[Bench]:
+def bench(make: Callable[..., AbstractContextManager[EmulatedStage]]) -> Iterator[EmulatedStage]:
     with make(MECHANICS) as bench:
         yield bench
 
 
-def test_it_says_who_answers(bench: Bench) -> None:
+def test_it_says_who_answers(bench: EmulatedStage) -> None:
     assert any(maker in bench.stage.identity() for maker in ("SMC100", "Zaber", "AZ"))
     # The port is none of it: a plug may move to another.
     assert str(bench.wire.port) not in bench.stage.identity()
 
 
-def test_nothing_moves_before_homing(bench: Bench) -> None:
+def test_nothing_moves_before_homing(bench: EmulatedStage) -> None:
     with pytest.raises(DeviceError, match=r"theta_r.*not homed.*home it first"):
         bench.stage.start_move(10.0)
     assert bench.moves() == 0
 
 
-def test_past_the_narrower_limit_not_a_byte_is_sent(bench: Bench) -> None:
+def test_past_the_narrower_limit_not_a_byte_is_sent(bench: EmulatedStage) -> None:
     bench.stage.home()
     assert bench.stage.limits_deg() == pytest.approx((-90.0, bench.max_deg), abs=1e-3)
     sent = len(bench.wire.seen)
@@ -72,7 +78,7 @@ def test_past_the_narrower_limit_not_a_byte_is_sent(bench: Bench) -> None:
     assert len(bench.wire.seen) == sent
 
 
-def test_it_goes_where_it_is_told(bench: Bench) -> None:
+def test_it_goes_where_it_is_told(bench: EmulatedStage) -> None:
     bench.stage.home()
     assert bench.stage.position_deg() == pytest.approx(0.0, abs=1e-3)
     for angle_deg in (10.0, -90.0, 79.9, 79.9, 79.901, 0.0):
@@ -82,7 +88,7 @@ def test_it_goes_where_it_is_told(bench: Bench) -> None:
 
 
 def test_a_move_begins_at_once_and_is_waited_for(
-    make: Callable[..., AbstractContextManager[Bench]],
+    make: Callable[..., AbstractContextManager[EmulatedStage]],
 ) -> None:
     with make(SLOW) as bench:
         bench.stage.home()
@@ -94,7 +100,7 @@ def test_a_move_begins_at_once_and_is_waited_for(
         assert time.monotonic() - begun_s > 0.2  # 5 degrees at 20 deg/s
 
 
-def test_homing_twice_is_no_harm(bench: Bench) -> None:
+def test_homing_twice_is_no_harm(bench: EmulatedStage) -> None:
     bench.stage.home()
     bench.stage.start_move(20.0)
     bench.stage.wait()
@@ -103,7 +109,7 @@ def test_homing_twice_is_no_harm(bench: Bench) -> None:
 
 
 def test_a_stop_from_another_thread_ends_the_move(
-    make: Callable[..., AbstractContextManager[Bench]],
+    make: Callable[..., AbstractContextManager[EmulatedStage]],
 ) -> None:
     with make(SLOW) as bench:
         bench.stage.home()
@@ -121,7 +127,7 @@ def test_a_stop_from_another_thread_ends_the_move(
         assert bench.stage.wait() == pytest.approx(0.0, abs=1e-3)
 
 
-def test_a_stop_of_a_stage_that_stands_is_no_harm(bench: Bench) -> None:
+def test_a_stop_of_a_stage_that_stands_is_no_harm(bench: EmulatedStage) -> None:
     bench.stage.stop()
     bench.stage.home()
     bench.stage.stop()
@@ -130,7 +136,9 @@ def test_a_stop_of_a_stage_that_stands_is_no_harm(bench: Bench) -> None:
     assert bench.stage.wait() == pytest.approx(3.0, abs=1e-3)
 
 
-def test_a_stop_is_on_the_wire_at_once(make: Callable[..., AbstractContextManager[Bench]]) -> None:
+def test_a_stop_is_on_the_wire_at_once(
+    make: Callable[..., AbstractContextManager[EmulatedStage]],
+) -> None:
     with make(SLOW) as bench:
         bench.stage.home()
         bench.stage.start_move(70.0)
@@ -142,7 +150,7 @@ def test_a_stop_is_on_the_wire_at_once(make: Callable[..., AbstractContextManage
 
 
 def test_what_holds_the_stage_is_a_stall(
-    make: Callable[..., AbstractContextManager[Bench]],
+    make: Callable[..., AbstractContextManager[EmulatedStage]],
 ) -> None:
     with make(SLOW) as bench:
         bench.stage.home()
@@ -155,7 +163,7 @@ def test_what_holds_the_stage_is_a_stall(
 
 
 def test_an_alarm_is_named_with_its_code_and_nothing_moves(
-    make: Callable[..., AbstractContextManager[Bench]],
+    make: Callable[..., AbstractContextManager[EmulatedStage]],
 ) -> None:
     with make(SLOW) as bench:
         bench.stage.home()
@@ -172,7 +180,7 @@ def test_an_alarm_is_named_with_its_code_and_nothing_moves(
         assert bench.moves() == moves
 
 
-def test_a_reference_that_is_not_found_ends_the_homing(bench: Bench) -> None:
+def test_a_reference_that_is_not_found_ends_the_homing(bench: EmulatedStage) -> None:
     bench.motor.homing_fails = True
     with pytest.raises(DeviceError, match=r"reference was not found within 3 s.*reference switch"):
         bench.stage.home()
@@ -201,7 +209,7 @@ class Parrot:
     ],
 )
 def test_a_wrong_device_is_refused_with_what_it_said(words: bytes, says: str) -> None:
-    with PtyWire([Parrot(words)]) as wire, Line("theta_r", wire.port, 57600) as line:
+    with PtyWire([Parrot(words)]) as wire, Line("theta_r", wire.port, 57600, SystemClock()) as line:
         with pytest.raises(DeviceError) as refused:
             NewportStage("theta_r", line, 1, "SMC100", LIMITS, SystemClock())
         assert says in str(refused.value)
@@ -210,7 +218,7 @@ def test_a_wrong_device_is_refused_with_what_it_said(words: bytes, says: str) ->
 
 def test_a_port_that_is_not_there_says_what_to_look_at(tmp_path: Path) -> None:
     with pytest.raises(PortGone, match=r"theta_r: cannot open .*nowhere.*look at the cable"):
-        Line("theta_r", str(tmp_path / "nowhere"), 57600)
+        Line("theta_r", str(tmp_path / "nowhere"), 57600, SystemClock())
 
 
 # Framing, against bytes from the makers' manuals.
@@ -269,7 +277,10 @@ class _StandsBetween(ZaberController):
 
 def test_a_zaber_position_is_one_of_rest_even_when_the_move_ends_within_a_reply() -> None:
     motor = Motor(SLOW, SystemClock())
-    with PtyWire([_StandsBetween(motor)]) as wire, Line("theta_r", wire.port, 115200) as line:
+    with (
+        PtyWire([_StandsBetween(motor)]) as wire,
+        Line("theta_r", wire.port, 115200, SystemClock()) as line,
+    ):
         stage = ZaberStage("theta_r", line, 1, 1, MICROSTEPS_PER_DEG, LIMITS, SystemClock())
         stage.home()
         stage.start_move(0.005)  # so short that even its beginning is within the tolerance
@@ -283,7 +294,7 @@ class _Braking(MotorStage):
         super().__init__("theta_r", LIMITS, SimulatedClock())
         self._left = asked_while_moving
 
-    def status(self, patient: bool = True) -> Status:  # noqa: ARG002 - a stage's form
+    def status(self, retry: bool = True) -> Status:  # noqa: ARG002 - a stage's form
         self._left -= 1
         return Status(5.0, moving=self._left >= 0, homed=True)
 
@@ -312,7 +323,9 @@ def test_zaber_checksum_is_the_manual_s() -> None:
 def test_zaber_replies_are_taken_apart() -> None:
     body = b"01 1 07 OK BUSY WR 153600"
     reply = zaber_framing.reply_of(b"@" + body + b":" + zaber_framing.checksum(body))
-    assert reply == zaber_framing.Reply(1, 1, 7, True, True, "WR", "153600")
+    assert reply == zaber_framing.Reply(
+        device=1, axis=1, message_id=7, accepted=True, busy=True, warning="WR", data="153600"
+    )
     assert not zaber_framing.homed([reply.warning])
 
 
@@ -341,18 +354,18 @@ def test_an_urgent_turn_goes_before_those_that_wait() -> None:
         waiting.wait()
         if urgent:
             until(started.is_set)
-        with turns.turn(urgent):
+        with turns.hold(urgent):
             order.append(name)
 
     started = threading.Event()
-    with turns.turn():
+    with turns.hold():
         threads = [threading.Thread(target=take, args=("asks", False)),
                    threading.Thread(target=take, args=("stops", True))]  # fmt: skip
         for thread in threads:
             thread.start()
         waiting.wait()
         started.set()
-        until(lambda: turns._urgent == 1)
+        until(lambda: turns._urgent_waiting == 1)
     for thread in threads:
         thread.join(DEADLINE_S)
     assert order == ["stops", "asks"]

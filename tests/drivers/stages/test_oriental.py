@@ -15,22 +15,23 @@ import sim.emulated.oriental_controller
 from drivers.lines.modbus_bus import ModbusBus
 from drivers.lines.serial_line import NoReply, PortGone
 from drivers.stages.motor_stage import Stopped
-from drivers.stages.oriental import OrientalSettings, OrientalStage
+from drivers.stages.oriental import OrientalStage
 from instrument.clock import SystemClock
 from instrument.errors import DeviceError, InputError
 from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway
 from sim.emulated.motor import Motor
 from sim.emulated.oriental_controller import OrientalController, crc
 from sim.emulated.wire import Fault, PtyWire, TcpWire
-from tests.support.stages.oriental_bench import (
+from tests.support.stages.emulated_az_drive import (
     FAST,
-    KINDS,
     LIMITS,
     SLOW,
     SLOW_LIMITS,
     STEPS_PER_DEG,
-    Bench,
-    bench,
+    WIRES,
+    EmulatedDrive,
+    az_settings,
+    emulated_drive,
 )
 
 pytestmark = pytest.mark.waits
@@ -39,25 +40,25 @@ STOP_TCP, STOP_RTU = bytes.fromhex("06 007D 0020"), bytes.fromhex("01 06 007D 00
 MOVE_WRITE = bytes.fromhex("10 0058 0010 20")
 
 
-@pytest.fixture(params=KINDS)
-def at(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    with bench(request.param, reply_s=0.1) as made:
+@pytest.fixture(params=WIRES)
+def at(request: pytest.FixtureRequest) -> Iterator[EmulatedDrive]:
+    with emulated_drive(request.param, reply_s=0.1) as made:
         yield made
 
 
-@pytest.fixture(params=KINDS)
-def slow_at(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    with bench(request.param, SLOW, SLOW_LIMITS) as made:
+@pytest.fixture(params=WIRES)
+def slow_at(request: pytest.FixtureRequest) -> Iterator[EmulatedDrive]:
+    with emulated_drive(request.param, SLOW, SLOW_LIMITS) as made:
         yield made
 
 
-def test_who_answers_is_said(at: Bench) -> None:
+def test_who_answers_is_said(at: EmulatedDrive) -> None:
     stage = at.open()
     assert stage.identity() == "Oriental Motor AZ drive, by its registers, unit 1"
-    assert "output 4020 hex, no alarm" in stage.found
+    assert "output 4020 hex, no alarm" in stage.opening_report
 
 
-def test_it_homes_moves_and_says_where_it_is(at: Bench) -> None:
+def test_it_homes_moves_and_says_where_it_is(at: EmulatedDrive) -> None:
     stage = at.homed()
     assert at.drive.homings == 1
     for count, angle in enumerate((12.34, -56.78, 169.994, 0.0), start=1):
@@ -70,7 +71,7 @@ def test_it_homes_moves_and_says_where_it_is(at: Bench) -> None:
     assert stage.wait() == 0.0
 
 
-def test_nothing_is_sent_for_a_move_past_a_limit(at: Bench) -> None:
+def test_nothing_is_sent_for_a_move_past_a_limit(at: EmulatedDrive) -> None:
     stage = at.homed()
     seen = list(at.wire.seen)
     for angle in (170.01, -170.01, float("nan")):
@@ -79,21 +80,23 @@ def test_nothing_is_sent_for_a_move_past_a_limit(at: Bench) -> None:
     assert at.wire.seen == seen
 
 
-def test_nothing_moves_before_homing(at: Bench) -> None:
+def test_nothing_moves_before_homing(at: EmulatedDrive) -> None:
     stage = at.open()
     with pytest.raises(DeviceError, match="not homed"):
         stage.start_move(1.0)
     assert not at.sent(MOVE_WRITE)
 
 
-def test_the_position_is_the_feedback_not_what_was_commanded(slow_at: Bench) -> None:
+def test_the_position_is_the_feedback_not_what_was_commanded(slow_at: EmulatedDrive) -> None:
     stage = slow_at.homed()
     stage.start_move(90.0)
     assert stage.position_deg() < 45.0
     assert stage.position_deg() == pytest.approx(slow_at.motor.position_deg, abs=1.0)
 
 
-def test_a_stop_from_another_thread_ends_the_wait_and_can_be_repeated(slow_at: Bench) -> None:
+def test_a_stop_from_another_thread_ends_the_wait_and_can_be_repeated(
+    slow_at: EmulatedDrive,
+) -> None:
     stage, ended = slow_at.homed(), []
     stage.start_move(90.0)
 
@@ -116,7 +119,7 @@ def test_a_stop_from_another_thread_ends_the_wait_and_can_be_repeated(slow_at: B
     assert slow_at.drive.triggers == 2
 
 
-def test_a_stop_waits_for_one_lost_answer_at_most(slow_at: Bench) -> None:
+def test_a_stop_waits_for_one_lost_answer_at_most(slow_at: EmulatedDrive) -> None:
     stage = slow_at.homed()
     stage.start_move(90.0)
     since = len(slow_at.wire.seen)
@@ -132,7 +135,7 @@ def test_a_stop_waits_for_one_lost_answer_at_most(slow_at: Bench) -> None:
     reading.join(timeout=5)
 
 
-def test_a_stop_does_not_wait_until_the_line_is_quiet(slow_at: Bench) -> None:
+def test_a_stop_does_not_wait_until_the_line_is_quiet(slow_at: EmulatedDrive) -> None:
     stage = slow_at.homed()
     stage.start_move(90.0)
     slow_at.wire.inject(Fault("drop"))
@@ -146,14 +149,14 @@ def test_a_stop_does_not_wait_until_the_line_is_quiet(slow_at: Bench) -> None:
     reading.join(timeout=5)
 
 
-def test_a_stop_left_in_the_drive_is_taken_back_before_the_first_motion(at: Bench) -> None:
+def test_a_stop_left_in_the_drive_is_taken_back_before_the_first_motion(at: EmulatedDrive) -> None:
     at.drive.serve(STOP_TCP)
     stage = at.homed()
     stage.start_move(1.0)
     assert stage.wait() == 1.0
 
 
-def test_an_alarm_ends_the_wait_and_forbids_moves(slow_at: Bench) -> None:
+def test_an_alarm_ends_the_wait_and_forbids_moves(slow_at: EmulatedDrive) -> None:
     stage = slow_at.homed()
     stage.start_move(90.0)
     slow_at.motor.fail("66")
@@ -168,7 +171,7 @@ def test_an_alarm_ends_the_wait_and_forbids_moves(slow_at: Bench) -> None:
 
 
 def test_a_target_beyond_the_drives_own_limits_is_its_alarm() -> None:
-    with bench("pty", replace(FAST, max_deg=90.0)) as at:
+    with emulated_drive("pty", replace(FAST, max_deg=90.0)) as at:
         stage = at.homed()
         stage.start_move(100.0)
         with pytest.raises(DeviceError, match="alarm 67h"):
@@ -177,7 +180,7 @@ def test_a_target_beyond_the_drives_own_limits_is_its_alarm() -> None:
 
 
 def test_a_held_stage_is_noticed() -> None:
-    with bench("pty", SLOW, SLOW_LIMITS) as at:
+    with emulated_drive("pty", SLOW, SLOW_LIMITS) as at:
         stage = at.homed()
         stage.start_move(30.0)
         _until(lambda: at.motor.position_deg > 0.5)
@@ -189,7 +192,7 @@ def test_a_held_stage_is_noticed() -> None:
 
 def test_a_held_motor_is_the_drives_overload(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sim.emulated.oriental_controller, "OVERLOAD_S", 0.2)
-    with bench("pty", SLOW, SLOW_LIMITS) as at:
+    with emulated_drive("pty", SLOW, SLOW_LIMITS) as at:
         stage = at.homed()
         stage.start_move(30.0)
         at.motor.hold()
@@ -198,7 +201,7 @@ def test_a_held_motor_is_the_drives_overload(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_reference_that_is_not_found_is_an_error_and_a_stop() -> None:
-    with bench("pty", FAST, replace(LIMITS, homing_s=0.2)) as at:
+    with emulated_drive("pty", FAST, replace(LIMITS, homing_s=0.2)) as at:
         at.motor.homing_fails = True
         stage = at.open()
         with pytest.raises(DeviceError, match=r"not found within 0.2 s"):
@@ -207,7 +210,7 @@ def test_a_reference_that_is_not_found_is_an_error_and_a_stop() -> None:
         assert not at.motor.homing
 
 
-def test_a_drive_that_is_not_ready_takes_no_move(at: Bench) -> None:
+def test_a_drive_that_is_not_ready_takes_no_move(at: EmulatedDrive) -> None:
     stage = at.homed()
     at.drive._free = True  # its FREE input: the motor is without current
     with pytest.raises(DeviceError, match=r"not ready to move .* STOP and FREE"):
@@ -215,24 +218,24 @@ def test_a_drive_that_is_not_ready_takes_no_move(at: Bench) -> None:
     assert at.drive.triggers == 0
 
 
-def test_a_stage_on_its_way_is_left_alone(at: Bench) -> None:
+def test_a_stage_on_its_way_is_left_alone(at: EmulatedDrive) -> None:
     stage = at.homed()
     at.motor.move(170.0)
     at.motor.hold()
     for command in (lambda: stage.start_move(1.0), stage.home):
-        with pytest.raises(DeviceError, match=r"is on its way already, .* or stop it first"):
+        with pytest.raises(DeviceError, match=r"is moving already, .* or stop it first"):
             command()
     assert at.drive.triggers == 0
     assert at.motor.moving
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", WIRES)
 def test_several_drives_share_one_line(kind: str) -> None:
     drives = [OrientalController(Motor(FAST, SystemClock()), unit, 100.0) for unit in (1, 2)]
     with PtyWire(drives) if kind == "pty" else TcpWire([ModbusTcpGateway(drives)]) as wire:
         port = wire.port if isinstance(wire, PtyWire) else f"tcp://localhost:{wire.port}"
-        one, two = (OrientalSettings(port, 100.0, LIMITS, parity="N", unit=unit) for unit in (1, 2))
-        with ModbusBus("line", one.bus) as bus:
+        one, two = (az_settings(port, unit=unit) for unit in (1, 2))
+        with ModbusBus("line", one.bus, SystemClock()) as bus:
             stages = [OrientalStage(f"axis {s.unit}", s, SystemClock(), bus) for s in (one, two)]
             for stage in stages:
                 stage.home()
@@ -271,27 +274,25 @@ class Says:
     ],
 )
 def test_what_does_not_answer_like_a_drive_is_refused(answer: str, says: str) -> None:
-    stage_settings = OrientalSettings("", 100.0, LIMITS, parity="N", reply_s=0.05)
     with PtyWire([Says(answer)]) as wire, pytest.raises(DeviceError, match=says):
-        OrientalStage("theta_r", replace(stage_settings, port=wire.port), SystemClock())
+        OrientalStage("theta_r", az_settings(wire.port, reply_s=0.05), SystemClock())
 
 
 @settings(max_examples=15)
 @given(st.binary(min_size=1, max_size=40))
 def test_noise_instead_of_an_answer_is_an_error_that_is_ours(noise: bytes) -> None:
-    stage_settings = OrientalSettings("", 100.0, LIMITS, parity="N", reply_s=0.004)
     with PtyWire([Says(noise.hex(), check=False)]) as wire, pytest.raises(DeviceError):
-        OrientalStage("theta_r", replace(stage_settings, port=wire.port), SystemClock())
+        OrientalStage("theta_r", az_settings(wire.port, reply_s=0.004), SystemClock())
 
 
 def test_a_drive_with_other_ranges_is_none() -> None:
-    with bench("pty") as at:
+    with emulated_drive("pty") as at:
         at.drive.serve(bytes.fromhex("10 0058 0002 04 0000 03E7"))
         with pytest.raises(DeviceError, match="is no Oriental Motor AZ drive: data number 999"):
             at.open()
 
 
-def test_silence_is_said_within_two_seconds(at: Bench) -> None:
+def test_silence_is_said_within_two_seconds(at: EmulatedDrive) -> None:
     begun_s = time.monotonic()
     with pytest.raises(NoReply, match=r"no answer|did not answer"):
         at.open(unit=7)
@@ -304,22 +305,21 @@ def test_silence_is_said_within_two_seconds(at: Bench) -> None:
 )
 def test_a_port_that_is_not_there_is_named(port: str, says: str) -> None:
     with pytest.raises(PortGone, match=says):
-        OrientalStage("theta_r", OrientalSettings(port, 100.0, LIMITS), SystemClock())
+        OrientalStage("theta_r", az_settings(port, parity="E"), SystemClock())
 
 
 @pytest.mark.parametrize("port", ["tcp://", "tcp://host:high"])
 def test_an_address_that_is_none_is_refused(port: str) -> None:
     with pytest.raises(InputError, match=port):
-        OrientalStage("theta_r", OrientalSettings(port, 100.0, LIMITS), SystemClock())
+        OrientalStage("theta_r", az_settings(port, parity="E"), SystemClock())
 
 
 def test_a_parity_that_the_port_refuses_is_said() -> None:
-    stage_settings = OrientalSettings("", 100.0, LIMITS, parity="X")  # type: ignore[arg-type]  # wrong
     with PtyWire([]) as wire, pytest.raises(PortGone, match=r"'X': look at .*, at the parity"):
-        OrientalStage("theta_r", replace(stage_settings, port=wire.port), SystemClock())
+        OrientalStage("theta_r", az_settings(wire.port, parity="X"), SystemClock())
 
 
-def test_a_closed_line_stays_closed(at: Bench) -> None:
+def test_a_closed_line_stays_closed(at: EmulatedDrive) -> None:
     stage = at.homed()
     stage.close()
     stage.close()
@@ -329,7 +329,7 @@ def test_a_closed_line_stays_closed(at: Bench) -> None:
 
 
 def test_a_gateway_that_has_hung_up_is_called_again() -> None:
-    with bench("tcp") as at:
+    with emulated_drive("tcp") as at:
         stage = at.homed()
         peer = at.wire._peer  # type: ignore[union-attr]  # a TcpWire's
         assert peer is not None
@@ -337,7 +337,7 @@ def test_a_gateway_that_has_hung_up_is_called_again() -> None:
         assert stage.position_deg() == 0.0
 
 
-def test_a_point_costs_little(at: Bench) -> None:
+def test_a_point_costs_little(at: EmulatedDrive) -> None:
     stage, spent = at.homed(), []
     for _ in range(9):
         since, begun_s = len(at.wire.seen), time.monotonic()

@@ -28,7 +28,7 @@ from instrument.errors import DeviceError, InputError
 from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.oriental_controller import OrientalController, crc
-from tests.support.stages.oriental_bench import FAST, LIMITS
+from tests.support.stages.emulated_az_drive import FAST, LIMITS
 
 # The maker's example: direct operation to 8500 steps at 2000 Hz, 1.5 kHz/s.
 EXAMPLE = bytes.fromhex(

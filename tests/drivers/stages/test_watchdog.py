@@ -9,10 +9,11 @@ from collections.abc import Iterator
 import pytest
 
 from drivers.stages.watchdog import SILENT_S, Watchdog
+from instrument.clock import SystemClock
 from instrument.errors import DeviceError
 from sim.emulated.wire import Fault
 from tests.drivers.stages.test_motor_stage import until
-from tests.support.stages.emulated_benches import BENCHES, SLOW, Bench
+from tests.support.stages.emulated_stages import EMULATED_STAGES, SLOW, EmulatedStage
 
 pytestmark = pytest.mark.waits
 
@@ -20,23 +21,23 @@ SILENCE = [Fault("drop")] * 500
 SLACK_S = 0.4  # a stop may wait for the answer that another question is owed; CI has two cores
 
 
-@pytest.fixture(params=list(BENCHES))
-def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
+@pytest.fixture(params=list(EMULATED_STAGES))
+def bench(request: pytest.FixtureRequest) -> Iterator[EmulatedStage]:
     """A slow stage under way, and nobody who waits for it."""
-    with BENCHES[request.param](SLOW) as bench:
+    with EMULATED_STAGES[request.param](SLOW) as bench:
         bench.stage.home()
         bench.stage.start_move(70.0)  # takes 3.5 s
         until(lambda: bench.motor.position_deg > 1.0)
         yield bench
 
 
-def test_while_nobody_asks_the_watchdog_does_and_the_move_goes_on(bench: Bench) -> None:
+def test_while_nobody_asks_the_watchdog_does_and_the_move_goes_on(bench: EmulatedStage) -> None:
     until(lambda: bench.motor.position_deg > 30.0)  # more than a second later, at 20 deg/s
     assert bench.motor.moving
     assert bench.stage.wait() == pytest.approx(70.0, abs=1e-2)
 
 
-def test_a_silent_line_ends_the_motion_though_nobody_waits(bench: Bench) -> None:
+def test_a_silent_line_ends_the_motion_though_nobody_waits(bench: EmulatedStage) -> None:
     silent_s = time.monotonic()
     bench.wire.inject(*SILENCE)
     until(lambda: not bench.motor.moving)
@@ -46,7 +47,7 @@ def test_a_silent_line_ends_the_motion_though_nobody_waits(bench: Bench) -> None
         bench.stage.wait()
 
 
-def test_a_silent_line_ends_the_motion_while_it_is_waited_for(bench: Bench) -> None:
+def test_a_silent_line_ends_the_motion_while_it_is_waited_for(bench: EmulatedStage) -> None:
     threading.Timer(0.1, lambda: bench.wire.inject(*SILENCE)).start()
     with pytest.raises(DeviceError, match=r"theta_r.*told to stop"):
         bench.stage.wait()
@@ -57,7 +58,7 @@ def test_a_silent_line_ends_the_motion_while_it_is_waited_for(bench: Bench) -> N
 def test_homing_is_watched_as_well() -> None:
     import dataclasses
 
-    for make in BENCHES.values():
+    for make in EMULATED_STAGES.values():
         with make(dataclasses.replace(SLOW, homing_s=10.0)) as bench:
             threading.Timer(0.1, lambda wire=bench.wire: wire.inject(*SILENCE)).start()
             with pytest.raises(DeviceError, match="told to stop"):
@@ -67,7 +68,9 @@ def test_homing_is_watched_as_well() -> None:
 
 def test_it_watches_only_while_something_moves() -> None:
     stops: list[float] = []
-    watchdog = Watchdog("theta_r", lambda: False, lambda: stops.append(time.monotonic()))
+    watchdog = Watchdog(
+        "theta_r", lambda: False, lambda: stops.append(time.monotonic()), SystemClock()
+    )
     watchdog.begin()
     watchdog.end()
     begun_s = time.monotonic()

@@ -8,7 +8,7 @@ from instrument.clock import SystemClock
 from sim.emulated.motor import Motor
 from sim.emulated.wire import PtyWire
 from sim.emulated.zaber_controller import MICROSTEPS_PER_DEG, ZaberController
-from tests.support.stages.emulated_benches import MECHANICS
+from tests.support.stages.emulated_stages import MECHANICS
 
 zaber = pytest.importorskip(
     "zaber_motion.ascii", reason="zaber-motion, the maker's library, is not installed"

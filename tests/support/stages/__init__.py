@@ -1,0 +1,1 @@
+"""Stages on emulated controllers: over real wires (`emulated_stages`) and in memory."""

@@ -1,74 +1,124 @@
-"""Every stage on simulated time and without a wire: thousands of moves in a second, no thread.
+"""Stage drivers over emulated controllers in memory, in simulated time and without a thread.
 
-The real drivers talk to their emulated controllers within a call. The watchdog, which lives in real
-time, is left out here; it has its own tests.
+The drivers' line code runs as it is; the port below it is replaced, so that ten thousand time-outs
+take no time. The watchdog runs in real time and is left out; it has tests of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
-from functools import cache
-from typing import Any
-from unittest.mock import patch
+import logging
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
-from drivers.lines.serial_line import Line
-from drivers.stages.newport import NewportStage
-from drivers.stages.oriental import OrientalSettings, OrientalStage
-from drivers.stages.zaber import ZaberStage
-from instrument.config.axes import SimulatedAxis
-from instrument.config.load import Loaded, load_protocol
-from instrument.devices import Stage
+import pytest
+
+from drivers.stages.motor_stage import Limits, MotorStage
+from drivers.stages.watchdog import Watchdog
 from sim.clock import SimulatedClock
-from sim.emulated.motor import Motor
-from sim.emulated.newport_controller import NewportController
-from sim.emulated.oriental_controller import OrientalController
+from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.wire import Controller
-from sim.emulated.zaber_controller import MICROSTEPS_PER_DEG, ZaberController
-from sim.scene.scene import Scene
-from sim.scene.stage import SimulatedStage
-from tests.support.paths import CONFIGS
-from tests.support.stages.emulated_benches import LIMITS, MECHANICS, STEPS_PER_DEG
-from tests.support.stages.memory_wire import Unwatched
+from tests.support.stages.kinds import KINDS, controller_for, open_stage
+
+MECHANICS = Mechanics(
+    min_deg=-95.0, max_deg=95.0, speed_deg_per_s=5000.0, acceleration_deg_per_s2=1e6,
+    home_deg=0.0, homing_s=0.004,
+)  # fmt: skip
+LIMITS = Limits(
+    min_deg=-90.0, max_deg=90.0, speed_deg_per_s=5000.0, acceleration_deg_per_s2=1e6,
+    tolerance_deg=0.01, homing_s=0.5,
+)  # fmt: skip
+Spoil = Callable[[random.Random, bytes], bytes]
+ENDLESS = 100_000  # readings of the clock in one action: it would never return
 
 
-@dataclass
-class Plant:
-    """A stage and what is behind it; `motor` is None where stage and motor are one.
+class CountingClock(SimulatedClock):
+    """Simulated clock; a reading takes a microsecond, and too many of them are an error.
 
-    `position_deg` is the truth and not what the stage says; `moves` counts what was begun.
+    A test sets `readings` to 0 before each action.
     """
 
-    stage: Stage
-    clock: SimulatedClock
-    position_deg: Callable[[], float]
-    moves: Callable[[], int]
-    motor: Motor | None = None
-    alarm: str = ""
+    def __init__(self) -> None:
+        super().__init__()
+        self.readings = 0
+
+    def now_s(self) -> float:
+        self.readings += 1
+        assert self.readings < ENDLESS, "waits without end"
+        self.sleep(1e-6)
+        return super().now_s()
 
 
-class _MemoryPort:
-    """A serial port whose other end answers within the call."""
+class MemoryWire:
+    """A controller right behind the driver's port.
+
+    `spoil` turns a genuine answer into what reaches the driver; `heard` is everything that did.
+    """
+
+    def __init__(self, controller: Controller, clock: SimulatedClock) -> None:
+        self._controller, self.clock = controller, clock
+        self.inbox = b""
+        self.spoil: Callable[[bytes], bytes] = lambda answer: answer
+        self.heard = bytearray()
+        self.genuine: list[bytes] = []
+
+    def open(self, *_: object, **__: object) -> MemoryPort:
+        """Stand in for `serial_for_url` and `create_connection`."""
+        return MemoryPort(self)
+
+    def request(self, data: bytes) -> None:
+        """Pass on a request; the answer is there at once."""
+        answer = self._controller.answer(data)
+        if answer:
+            self.genuine.append(answer)
+            answer = self.spoil(answer)
+            self.inbox += answer
+            self.heard += answer
+
+    def ready(self, _: int, seconds: float) -> bool:
+        """Stand in for select."""
+        if not self.inbox:
+            self.clock.sleep(seconds)
+        return bool(self.inbox)
+
+
+class MemoryPort:
+    """Stands in for pyserial's port and for a socket."""
 
     timeout = 0.0
 
-    def __init__(self, controller: Controller) -> None:
-        self._controller, self._waiting, self._open = controller, b"", True
+    def __init__(self, wire: MemoryWire) -> None:
+        self._wire, self._open = wire, True
 
     def write(self, data: bytes) -> int:
+        """Send bytes."""
         self._require_open()
-        self._waiting += self._controller.answer(data)
+        self._wire.request(bytes(data))
         return len(data)
 
-    def read(self, count: int) -> bytes:
-        self._require_open()
-        read, self._waiting = self._waiting[:count], self._waiting[count:]
-        return read
+    send = write
 
     @property
     def in_waiting(self) -> int:
-        return len(self._waiting)
+        """Bytes that have arrived."""
+        return len(self._wire.inbox)
+
+    def read(self, size: int = 1) -> bytes:
+        """Up to `size` bytes, after the time-out if there are none."""
+        self._require_open()
+        wire = self._wire
+        if not wire.inbox:
+            wire.clock.sleep(self.timeout)
+        data, wire.inbox = wire.inbox[:size], wire.inbox[size:]
+        return data
+
+    recv = read
+
+    def fileno(self) -> int:
+        return -1
+
+    def setsockopt(self, *_: int) -> None:
+        pass
 
     def close(self) -> None:
         self._open = False
@@ -78,102 +128,60 @@ class _MemoryPort:
             raise OSError("port not open")
 
 
-class _MemoryUnit:
-    """A Modbus unit that is asked within the call; stands in for `ModbusUnit`."""
+class NoWatchdog(Watchdog):
+    """Leaves the stage alone: its thread would live in real time."""
 
-    where = "memory"
-
-    def __init__(self, drive: OrientalController) -> None:
-        self._drive = drive
-
-    def read(self, register: int, count: int, _until_s: float | None = None) -> list[int]:
-        answer = self._drive.serve(bytes([3]) + _words(register, count))[2:]
-        return [int.from_bytes(answer[n : n + 2], "big") for n in range(0, len(answer), 2)]
-
-    def write(
-        self, register: int, values: Sequence[int], _until_s: float, unless: Callable[[], None]
-    ) -> None:
-        unless()
-        count = len(values)
-        body = _words(register, count) + bytes([2 * count]) + _words(*values)
-        assert self._drive.serve(bytes([16]) + body)[0] == 16, "refused"
-
-    def write_at_once(self, register: int, word: int) -> None:
-        assert self._drive.serve(bytes([6]) + _words(register, word))[0] == 6, "refused"
+    def begin(self) -> None:
+        pass
 
 
-def _words(*values: int) -> bytes:
-    return b"".join((value & 0xFFFF).to_bytes(2, "big") for value in values)
+@dataclass
+class MemoryStage:
+    """A stage's surroundings in memory; `open` makes the driver anew on the same wire."""
+
+    clock: CountingClock
+    motor: Motor
+    wire: MemoryWire
+    alarm: str
+    moves: Callable[[], int] = field(repr=False)
+    limits: Limits
+    kind: str
+
+    def open(self) -> MotorStage:
+        stage = open_stage(self.kind, _ADDRESS[KINDS[self.kind].tcp], self.limits, self.clock)
+        stage.watchdog = NoWatchdog("none", lambda: True, lambda: None, self.clock)
+        return stage
+
+    def spoil_next(self, rng: random.Random, spoil: Spoil) -> None:
+        """Spoil some of the next answers, and leave all later ones whole."""
+        first, count = rng.choice((0, 0, 1, 2, 3, 5)), rng.choice((1, 1, 1, 2, 4, 12))
+        coming = [False] * first + [True] * count
+
+        def spoiled(answer: bytes) -> bytes:
+            if coming and coming.pop(0):
+                return spoil(rng, answer)
+            return answer
+
+        self.wire.spoil = spoiled
 
 
-@contextmanager
-def newport() -> Iterator[Plant]:
-    """An SMC100: limits of its own on one side, keeps its reference."""
-    with _patched() as (clock, motor):
-        controller = NewportController(motor)
-        with patch("serial.serial_for_url", lambda *_, **__: _MemoryPort(controller)):
-            line = Line("theta_r", "memory", 57600)
-        stage = NewportStage("theta_r", line, 1, "SMC100", LIMITS, clock)
-        yield _plant(stage, clock, motor, lambda: controller.moves, "0020")
+_ADDRESS = {False: "wire", True: "tcp://gateway:502"}
 
 
-@contextmanager
-def zaber() -> Iterator[Plant]:
-    """An X-RSW60: limits of its own on one side."""
-    with _patched() as (clock, motor):
-        controller = ZaberController(motor)
-        with patch("serial.serial_for_url", lambda *_, **__: _MemoryPort(controller)):
-            line = Line("theta_r", "memory", 115200)
-        stage = ZaberStage("theta_r", line, 1, 1, MICROSTEPS_PER_DEG, LIMITS, clock)
-        yield _plant(stage, clock, motor, lambda: controller.moves, "FS")
-
-
-@contextmanager
-def oriental() -> Iterator[Plant]:
-    """An AZ drive: its own limits cannot be asked for, so the rig file's must be as narrow."""
-    with _patched() as (clock, motor):
-        drive = OrientalController(motor, steps_per_deg=STEPS_PER_DEG, now_s=clock.now_s)
-        limits = replace(LIMITS, max_deg=MECHANICS.max_deg)
-        settings = OrientalSettings("memory", STEPS_PER_DEG, limits)
-        with patch("drivers.stages.oriental.ModbusUnit", lambda *_: _MemoryUnit(drive)):
-            stage = OrientalStage("theta_r", settings, clock, bus=_no_bus())
-        yield _plant(stage, clock, motor, lambda: drive.triggers, "30")
-
-
-@contextmanager
-def simulated() -> Iterator[Plant]:
-    """The simulated stage; what it begins is seen by where it is."""
-    loaded = _demo()
-    axis, sample = loaded.rig.axes.theta_r, loaded.protocol.simulated_sample
-    assert isinstance(axis, SimulatedAxis)
-    assert sample is not None
-    clock = SimulatedClock()
-    stage = SimulatedStage("theta_r", axis, Scene(loaded.rig, loaded.protocol, sample), clock)
-    yield Plant(stage, clock, stage.position_deg, lambda: 0)
-
-
-@cache
-def _demo() -> Loaded:
-    return load_protocol(CONFIGS / "protocols" / "demo.yaml")
-
-
-@contextmanager
-def _patched() -> Iterator[tuple[SimulatedClock, Motor]]:
-    clock = SimulatedClock()
-    with ExitStack() as stack:
-        stack.enter_context(patch("drivers.stages.motor_stage.Watchdog", Unwatched))
-        yield clock, Motor(MECHANICS, clock)
-
-
-def _plant(
-    stage: Stage, clock: SimulatedClock, motor: Motor, moves: Callable[[], int], alarm: str
-) -> Plant:
-    return Plant(stage, clock, lambda: motor.position_deg, moves, motor, alarm)
-
-
-def _no_bus() -> Any:
-    """The unit alone is asked."""
-    return object()
-
-
-PLANTS = {"simulated": simulated, "newport": newport, "zaber": zaber, "oriental": oriental}
+def in_memory(
+    kind: str,
+    patch: pytest.MonkeyPatch,
+    mechanics: Mechanics = MECHANICS,
+    limits: Limits = LIMITS,
+) -> MemoryStage:
+    """A wire of this kind, whatever port a driver opens while the patch holds."""
+    clock = CountingClock()
+    motor = Motor(mechanics, clock)
+    controller, moves = controller_for(kind, motor, clock)
+    wire = MemoryWire(controller, clock)
+    # Each repeated query is logged; what a test runner keeps of that is no leak.
+    patch.setattr(logging.Logger, "warning", lambda *_: None)
+    patch.setattr("serial.serial_for_url", wire.open)
+    patch.setattr("socket.create_connection", wire.open)
+    patch.setattr("drivers.lines.modbus_client._ready", wire.ready)
+    return MemoryStage(clock, motor, wire, KINDS[kind].alarm, moves, limits, kind)

@@ -26,14 +26,14 @@ from instrument.errors import DeviceError
 from instrument.record.record import Record
 from tests.support.paths import CONFIGS
 from tests.support.scans import changed
-from tests.support.stages.emulated_benches import BENCHES, SLOW, Bench
+from tests.support.stages.emulated_stages import EMULATED_STAGES, SLOW, EmulatedStage
 
 DEADLINE_S = 10.0
 
 
 def main(name: str, how: str) -> None:
     stop_on_signals()  # anew for each scan: the stop before was another command's
-    with BENCHES[name](SLOW) as bench, TemporaryDirectory() as folder:
+    with EMULATED_STAGES[name](SLOW) as bench, TemporaryDirectory() as folder:
         moment: list[float] = []
         threading.Thread(target=_interrupt, args=(bench, how, moment), daemon=True).start()
         try:
@@ -48,12 +48,12 @@ def main(name: str, how: str) -> None:
         sys.stdout.write(f"{stops[0] - moment[0]} {bench.motor.moving}\n")
 
 
-def _stops(bench: Bench, moment: list[float]) -> list[float]:
+def _stops(bench: EmulatedStage, moment: list[float]) -> list[float]:
     """When stops came that belong to what happened at that moment."""
     return [at for at, data in bench.wire.seen if moment and at >= moment[0] and bench.stop in data]
 
 
-def _interrupt(bench: Bench, how: str, moment: list[float]) -> None:
+def _interrupt(bench: EmulatedStage, how: str, moment: list[float]) -> None:
     """Once the stage is well under way."""
     while not (bench.motor.moving and abs(bench.motor.position_deg) > 3):
         time.sleep(0.001)
@@ -62,7 +62,7 @@ def _interrupt(bench: Bench, how: str, moment: list[float]) -> None:
         os.kill(os.getpid(), getattr(signal, how))
 
 
-def _scan(bench: Bench, how: str, moment: list[float], folder: Path) -> None:
+def _scan(bench: EmulatedStage, how: str, moment: list[float], folder: Path) -> None:
     sweep = {"theta_i_deg": [60.0], "dphi_deg": [0.0], "theta_r_deg": [-70.0, 0.0]}
     loaded = changed(load_protocol(CONFIGS / "protocols" / "demo.yaml"), sweeps=[sweep])
     devices = open_devices(loaded)

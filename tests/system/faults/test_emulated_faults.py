@@ -33,7 +33,7 @@ from sim.scene.scene import Scene
 from tests.support import faulty_scan
 from tests.support.faulty_scan import Ended, Watching, require_named
 from tests.support.scans import changed, small_scan
-from tests.support.stages.emulated_benches import BENCHES, Bench
+from tests.support.stages.emulated_stages import EMULATED_STAGES, EmulatedStage
 
 pytestmark = pytest.mark.waits
 
@@ -53,7 +53,7 @@ STATES: dict[str, tuple[When, str, int]] = {
     "reading": ("at", "theta_r.position_deg", 2),
     "writing": ("at", "record.add_reading", 1),
 }
-Strike = Callable[[Bench], None]
+Strike = Callable[[EmulatedStage], None]
 
 
 def once(fault: Fault) -> Strike:
@@ -105,7 +105,7 @@ class Witness:
     """The camera: has the scene stand as the motor does, and remembers where it stood."""
 
     camera: object
-    bench: Bench
+    bench: EmulatedStage
     scene: Scene
     stood_deg: dict[int, list[float]] = field(default_factory=lambda: defaultdict(list))
 
@@ -134,7 +134,7 @@ def short() -> Loaded:
     return changed(small, rig={"axes": axes}, sweeps=[sweep], references=References())
 
 
-def devices_of(loaded: Loaded, bench: Bench, triggers: Triggers) -> tuple[Devices, Witness]:
+def devices_of(loaded: Loaded, bench: EmulatedStage, triggers: Triggers) -> tuple[Devices, Witness]:
     faults = Faults()
     devices = open_devices(loaded, faults)
     assert faults.scene is not None
@@ -146,7 +146,7 @@ def devices_of(loaded: Loaded, bench: Bench, triggers: Triggers) -> tuple[Device
     return replace(devices, axes=axes, camera=camera), witness  # type: ignore[arg-type]  # passes all on
 
 
-def scan(loaded: Loaded, bench: Bench, folder: Path, triggers: Triggers) -> Ended:
+def scan(loaded: Loaded, bench: EmulatedStage, folder: Path, triggers: Triggers) -> Ended:
     """Run, or go on; each accepted reading was taken where it should be."""
     devices, witness = devices_of(loaded, bench, triggers)
     ended = faulty_scan.scan(loaded, folder, lambda: devices, triggers)
@@ -157,7 +157,7 @@ def scan(loaded: Loaded, bench: Bench, folder: Path, triggers: Triggers) -> Ende
     return ended
 
 
-def whole_scan(loaded: Loaded, bench: Bench, folder: Path) -> list[Reading]:
+def whole_scan(loaded: Loaded, bench: EmulatedStage, folder: Path) -> list[Reading]:
     """Run or go on to the end; on a busy machine the emulated controller itself may be too late."""
     for last in (False, False, True):
         ended = scan(loaded, bench, folder, Triggers())
@@ -178,7 +178,7 @@ def sound(
     def readings(kind: str) -> list[Reading]:
         if kind not in known:
             folder = tmp_path_factory.mktemp("sound") / "run"
-            with BENCHES[kind]() as bench:
+            with EMULATED_STAGES[kind]() as bench:
                 known[kind] = whole_scan(short, bench, folder)
         return known[kind]
 
@@ -186,7 +186,7 @@ def sound(
 
 
 def cases() -> Iterator[tuple[str, str]]:
-    yield from ((bench, state) for bench in BENCHES for state in STATES)
+    yield from ((bench, state) for bench in EMULATED_STAGES for state in STATES)
 
 
 @pytest.mark.slow
@@ -205,7 +205,7 @@ def test_a_fault_in_a_state(
     chosen = names if slow else [names[(2 * number + n) % len(names)] for n in (0, 1)]
     for name in chosen:
         triggers, folder = Triggers(), tmp_path / name
-        with BENCHES[kind]() as bench:
+        with EMULATED_STAGES[kind]() as bench:
             triggers.plan(*STATES[state], partial(EVERY[name], bench))
             ended = scan(short, bench, folder, triggers)
             assert ended.readings == sound(kind)[: len(ended.readings)]
@@ -214,7 +214,7 @@ def test_a_fault_in_a_state(
                 require_got_over(ended, name, state)
             else:
                 require_stopped(ended, bench, name, state, folder)
-                other = BENCHES[kind]() if name == "unplug" else seen_to(bench)
+                other = EMULATED_STAGES[kind]() if name == "unplug" else seen_to(bench)
                 with other as again:
                     assert whole_scan(short, again, folder) == sound(kind)
 
@@ -225,7 +225,9 @@ def require_got_over(ended: Ended, name: str, state: str) -> None:
         assert ended.events["retry"]
 
 
-def require_stopped(ended: Ended, bench: Bench, name: str, state: str, folder: Path) -> None:
+def require_stopped(
+    ended: Ended, bench: EmulatedStage, name: str, state: str, folder: Path
+) -> None:
     """Named; of what is mostly got over, it is too late an answer that ends the scan."""
     says = STOPS[name][1] if name in STOPS else "stall|stands|homed|reference"
     if name in RECOVERS or state in SET_RIGHT.get(name, ()):
@@ -235,7 +237,7 @@ def require_stopped(ended: Ended, bench: Bench, name: str, state: str, folder: P
     require_still(bench)
 
 
-def require_still(bench: Bench) -> None:
+def require_still(bench: EmulatedStage) -> None:
     """A stop that is on its way is soon heard; a move that no stop can reach ends by itself."""
     end_s = time.monotonic() + DEADLINE_S
     while bench.motor.moving:
@@ -244,7 +246,7 @@ def require_still(bench: Bench) -> None:
 
 
 @contextmanager
-def seen_to(bench: Bench) -> Iterator[Bench]:
+def seen_to(bench: EmulatedStage) -> Iterator[EmulatedStage]:
     """The same controller, put right and asked anew."""
     bench.wire.clear_faults()
     bench.motor.alarm = ""

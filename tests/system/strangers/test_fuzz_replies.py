@@ -26,29 +26,29 @@ from drivers.stages import newport_framing, oriental_framing, zaber_framing
 from drivers.stages.motor_stage import MotorStage
 from instrument.errors import DeviceError
 from sim.emulated.oriental_controller import crc
-from tests.support.stages.memory_wire import STEPS_PER_DEG, MemoryBench, Spoil, bench
+from tests.support.stages.kinds import KINDS, STEPS_PER_DEG
+from tests.support.stages.memory_stages import MemoryStage, Spoil, in_memory
 from tests.support.strangers.mutations import Mutator, feed
 
-KINDS = ("newport", "zaber", "oriental rtu", "oriental tcp")
 ONCE_MORE_S = 10.0  # simulated; the longest action has a time-out of 2.5 s and asks three times
 
 
-def status(stage: MotorStage, _: MemoryBench, __: random.Random) -> float:
+def status(stage: MotorStage, _: MemoryStage, __: random.Random) -> float:
     return stage.status().position_deg
 
 
-def move(stage: MotorStage, _: MemoryBench, rng: random.Random) -> float:
+def move(stage: MotorStage, _: MemoryStage, rng: random.Random) -> float:
     stage.start_move(rng.uniform(-80.0, 80.0))
     return stage.wait()
 
 
-def home(stage: MotorStage, _: MemoryBench, __: random.Random) -> float:
+def home(stage: MotorStage, _: MemoryStage, __: random.Random) -> float:
     stage.home()
     return stage.position_deg()
 
 
-def open_again(_: MotorStage, wire: MemoryBench, __: random.Random) -> float:
-    return wire.open().status().position_deg
+def open_again(_: MotorStage, memory: MemoryStage, __: random.Random) -> float:
+    return memory.open().status().position_deg
 
 
 ACTIONS = (status, move, home, open_again)
@@ -59,7 +59,7 @@ class Session:
     """A stage that has been homed, and what its wire makes of the answers."""
 
     kind: str
-    wire: MemoryBench
+    memory: MemoryStage
     spoil: Spoil
     stage: MotorStage
     wrong: int = 0
@@ -69,33 +69,33 @@ class Session:
         """A session whose genuine answers, of every question once, are the mutator's examples."""
         # pytest would keep all that is logged.
         patch.setattr(logging.getLogger("pymodbus.logging"), "disabled", True)
-        wire = bench(kind, patch)
-        stage = wire.open()
+        memory = in_memory(kind, patch)
+        stage = memory.open()
         stage.home()
         stage.start_move(10.0)
         assert stage.wait() == pytest.approx(10.0, abs=1e-3)
-        examples = tuple(dict.fromkeys(wire.port.genuine))
-        return cls(kind, wire, Mutator(examples, seed).spoil, stage)
+        examples = tuple(dict.fromkeys(memory.wire.genuine))
+        return cls(kind, memory, Mutator(examples, seed).spoil, stage)
 
     def take(self, number: int) -> None:
         """One action with some answers spoilt; then, with none, the truth."""
         rng = random.Random(number)
-        wire, action = self.wire, rng.choice(ACTIONS)
-        wire.port.heard.clear()
-        wire.port.genuine.clear()
-        wire.clock.looks, began_s, moves = 0, wire.clock.now_s(), wire.moves()
-        wire.spoil_next(rng, self.spoil)
+        memory, action = self.memory, rng.choice(ACTIONS)
+        memory.wire.heard.clear()
+        memory.wire.genuine.clear()
+        memory.clock.readings, began_s, moves = 0, memory.clock.now_s(), memory.moves()
+        memory.spoil_next(rng, self.spoil)
         said = ""
         try:
-            self._judge(action(self.stage, wire, rng))
+            self._judge(action(self.stage, memory, rng))
         except DeviceError as error:
             said = str(error)
         except BaseException as error:
-            error.add_note(f"{action.__name__}, heard {bytes(wire.port.heard[-2000:])!r}")
+            error.add_note(f"{action.__name__}, heard {bytes(memory.wire.heard[-2000:])!r}")
             raise
         assert said.isprintable(), "a message that a terminal could stumble over"
-        assert wire.clock.now_s() - began_s < ONCE_MORE_S
-        assert wire.moves() - moves <= (2 if self.kind == "oriental tcp" else 1)
+        assert memory.clock.now_s() - began_s < ONCE_MORE_S
+        assert memory.moves() - moves <= (2 if self.kind == "oriental tcp" else 1)
         self._heal()
 
     def _judge(self, said_deg: float) -> None:
@@ -103,24 +103,24 @@ class Session:
         if self.kind == "newport":
             assert true or said_deg in self._newport_numbers()
         elif self.kind == "oriental rtu":
-            assert true, f"{said_deg} deg, and it stands at {self.wire.motor.position_deg} deg"
+            assert true, f"{said_deg} deg, and it stands at {self.memory.motor.position_deg} deg"
         self.wrong += not true
 
     def is_true(self, said_deg: float) -> bool:
-        return abs(said_deg - self.wire.motor.position_deg) < 2 / STEPS_PER_DEG
+        return abs(said_deg - self.memory.motor.position_deg) < 2 / STEPS_PER_DEG
 
     def _newport_numbers(self) -> set[float | None]:
         """What whole answers to TP have said."""
-        lines = bytes(self.wire.port.heard).replace(b"\0", b"").split(b"\n")
+        lines = bytes(self.memory.wire.heard).replace(b"\0", b"").split(b"\n")
         answers = [line.strip(b"\r")[3:] for line in lines if line.startswith(b"1TP")]
         return {number_of(text.decode("latin-1").strip()) for text in answers}
 
     def _heal(self) -> None:
-        self.wire.port.spoil = lambda answer: answer
-        self.wire.clock.looks = 0
-        self.wire.clock.sleep(1.0)  # whatever it was told to do has ended
+        self.memory.wire.spoil = lambda answer: answer
+        self.memory.clock.readings = 0
+        self.memory.clock.sleep(1.0)  # whatever it was told to do has ended
         assert self.is_true(self.stage.status().position_deg), "wrong on a sound line"
-        if not self.wire.motor.referenced:
+        if not self.memory.motor.referenced:
             self.stage.home()
 
 
@@ -171,7 +171,7 @@ def test_one_wrong_byte_in_a_position_is_never_taken(
 ) -> None:
     """Both checks find every error within one byte; here the driver does, at every place."""
     session = Session.of(kind, monkeypatch)
-    length = len(session.wire.port.genuine[-1])
+    length = len(session.memory.wire.genuine[-1])
     masks = range(1, 256) if slow else (16,)
     for number in range(length * len(masks)):
         at, mask = number % length, masks[number // length]
@@ -180,7 +180,7 @@ def test_one_wrong_byte_in_a_position_is_never_taken(
             place = at % len(answer)
             return answer[:place] + bytes([answer[place] ^ mask]) + answer[place + 1 :]
 
-        session.wire.clock.looks, session.wire.port.spoil = 0, damaged
+        session.memory.clock.readings, session.memory.wire.spoil = 0, damaged
         try:
             taken = session.stage.status().position_deg
         except Garbled:
@@ -191,7 +191,7 @@ def test_one_wrong_byte_in_a_position_is_never_taken(
 def test_a_gateway_that_mixes_up_answers_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whole answers to other questions, other units, other transactions, and parts of them."""
     session = Session.of("oriental tcp", monkeypatch)
-    earlier = list(session.wire.port.genuine)
+    earlier = list(session.memory.wire.genuine)
 
     def mixed(rng: random.Random, answer: bytes) -> bytes:
         kind = rng.randrange(4)
@@ -285,7 +285,7 @@ def test_oriental_framing_reads_any_registers(slow: bool) -> None:
         assert all(-(1 << 31) <= value < 1 << 31 for value in values)
         again = oriental_framing.words_of(direct.position)
         assert again == (words[4], words[5])
-        if not oriental_framing.unlike_az(direct, output):
+        if not oriental_framing.az_mismatch(direct, output):
             assert bool(output.fault) == bool(output.alarm)
         assert (output.fault + str(direct)).isprintable()
 

@@ -24,7 +24,7 @@ from instrument.text.terminal_safe import escape_control_characters, first_unfit
 from tests.instrument.config.test_load import PROTOCOL, RIG
 from tests.support.csv_texts import BARE
 from tests.support.paths import CONFIGS
-from tests.support.stages.memory_wire import bench
+from tests.support.stages.memory_stages import in_memory
 
 HARMFUL = "\x1b]0;mine\x07\x1b[2J\u202e[bold red]:skull:[link=http://x]here[/link]\r"
 
@@ -243,15 +243,15 @@ def test_a_zaber_that_sends_commands_to_the_terminal_is_not_repeated(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Its checksum is right: what it says is still shown to nobody, and is no answer."""
-    wire = bench("zaber", monkeypatch)
+    memory = in_memory("zaber", monkeypatch)
 
     def coloured(answer: bytes) -> bytes:
         body = answer[1 : answer.index(b":")] + b"\x1b[2J"
         return b"@%b:%02X\r\n" % (body, -sum(body) & 0xFF)
 
-    wire.port.spoil = coloured
+    memory.wire.spoil = coloured
     with pytest.raises(DeviceError) as failed:
-        wire.open()
+        memory.open()
     assert first_unfit(str(failed.value)) is None
 
 

@@ -1,10 +1,10 @@
-"""An emulated AZ drive on a wire and the driver before it, for the tests of both."""
+"""Emulated AZ drive on a wire, and the driver that opens it, for the tests of both."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from drivers.stages.motor_stage import Limits
 from drivers.stages.oriental import OrientalSettings, OrientalStage
@@ -13,20 +13,29 @@ from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.oriental_controller import OrientalController
 from sim.emulated.wire import PtyWire, TcpWire
+from tests.support.stages.emulated_stages import port_of
 
 STEPS_PER_DEG = 100.0
-LIMITS = Limits(-170.0, 170.0, 2000.0, 100e3, 0.02, 2.0)
+LIMITS = Limits(
+    min_deg=-170.0, max_deg=170.0, speed_deg_per_s=2000.0, acceleration_deg_per_s2=100e3,
+    tolerance_deg=0.02, homing_s=2.0,
+)  # fmt: skip
+SLOW_LIMITS = replace(LIMITS, speed_deg_per_s=10.0, acceleration_deg_per_s2=1000.0)
 FAST = Mechanics(speed_deg_per_s=2000.0, acceleration_deg_per_s2=100e3, homing_s=0.03)
 SLOW = Mechanics(speed_deg_per_s=10.0, acceleration_deg_per_s2=1000.0, homing_s=0.03)
-SLOW_LIMITS = Limits(-170.0, 170.0, 10.0, 1000.0, 0.02, 2.0)
-KINDS = ("pty", "tcp")
+WIRES = ("pty", "tcp")
+
+
+def az_settings(port: str, **changes: object) -> OrientalSettings:
+    """Settings of a drive with 100 steps per degree on this port."""
+    plain = OrientalSettings(port=port, steps_per_deg=STEPS_PER_DEG, limits=LIMITS, parity="N")
+    return replace(plain, **changes)  # type: ignore[arg-type]  # the caller's
 
 
 @dataclass
-class Bench:
-    """A wire with one drive on it. `reply_s`: what the driver is told of its time-out."""
+class EmulatedDrive:
+    """A wire with one drive on it. `reply_s`: time-out given to the driver."""
 
-    kind: str
     wire: PtyWire | TcpWire
     drive: OrientalController
     limits: Limits
@@ -42,9 +51,7 @@ class Bench:
         return port_of(self.wire)
 
     def open(self, unit: int = 1) -> OrientalStage:
-        settings = OrientalSettings(
-            self.port, STEPS_PER_DEG, self.limits, parity="N", unit=unit, reply_s=self.reply_s
-        )
+        settings = az_settings(self.port, limits=self.limits, unit=unit, reply_s=self.reply_s)
         self.stages.append(OrientalStage("theta_r", settings, SystemClock()))
         return self.stages[-1]
 
@@ -54,23 +61,20 @@ class Bench:
         return stage
 
     def sent(self, function_and_register: bytes, since: int = 0) -> list[float]:
-        """When requests that contain these bytes came, after the first `since`."""
+        """Times of requests that contain these bytes, after the first `since`."""
         return [at for at, data in self.wire.seen[since:] if function_and_register in data]
 
 
-def port_of(wire: PtyWire | TcpWire) -> str:
-    return wire.port if isinstance(wire, PtyWire) else f"tcp://{wire.host}:{wire.port}"
-
-
 @contextmanager
-def bench(
-    kind: str, mechanics: Mechanics = FAST, limits: Limits = LIMITS, reply_s: float = 0.25
-) -> Iterator[Bench]:
+def emulated_drive(
+    wire_kind: str, mechanics: Mechanics = FAST, limits: Limits = LIMITS, reply_s: float = 0.25
+) -> Iterator[EmulatedDrive]:
+    """A drive on a pseudo-terminal ("pty"), or behind a gateway ("tcp")."""
     drive = OrientalController(Motor(mechanics, SystemClock()), steps_per_deg=STEPS_PER_DEG)
     wire: PtyWire | TcpWire
-    wire = PtyWire([drive]) if kind == "pty" else TcpWire([ModbusTcpGateway([drive])])
+    wire = PtyWire([drive]) if wire_kind == "pty" else TcpWire([ModbusTcpGateway([drive])])
     with wire:
-        made = Bench(kind, wire, drive, limits, reply_s)
+        made = EmulatedDrive(wire, drive, limits, reply_s)
         try:
             yield made
         finally:

@@ -1,0 +1,66 @@
+"""Kinds of motor stages for the tests: each one's emulated controller, and its driver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from drivers.lines.serial_line import Line
+from drivers.stages.motor_stage import Limits, MotorStage
+from drivers.stages.newport import NewportStage
+from drivers.stages.oriental import OrientalSettings, OrientalStage
+from drivers.stages.zaber import ZaberStage
+from instrument.clock import Clock
+from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway
+from sim.emulated.motor import Motor
+from sim.emulated.newport_controller import NewportController
+from sim.emulated.oriental_controller import OrientalController
+from sim.emulated.wire import Controller
+from sim.emulated.zaber_controller import MICROSTEPS_PER_DEG, ZaberController
+
+STEPS_PER_DEG = 1000.0
+
+
+@dataclass(frozen=True)
+class Kind:
+    """`alarm`: a fault in the controller's own code; `stop`: bytes of its stop command.
+
+    `keeps_limits`: the controller has limits of its own that can be read.
+    """
+
+    alarm: str
+    stop: bytes
+    tcp: bool = False
+    keeps_limits: bool = True
+
+
+KINDS = {
+    "newport": Kind("0020", b"1ST"),
+    "zaber": Kind("FS", b" stop:"),
+    "oriental rtu": Kind("30", bytes.fromhex("06007D0020"), keeps_limits=False),
+    "oriental tcp": Kind("30", bytes.fromhex("06007D0020"), tcp=True, keeps_limits=False),
+}
+
+
+def controller_for(kind: str, motor: Motor, clock: Clock) -> tuple[Controller, Callable[[], int]]:
+    """Return a controller as it appears on the wire, and its count of moves begun."""
+    if kind == "newport":
+        newport = NewportController(motor)
+        return newport, lambda: newport.moves
+    if kind == "zaber":
+        zaber = ZaberController(motor)
+        return zaber, lambda: zaber.moves
+    drive = OrientalController(motor, steps_per_deg=STEPS_PER_DEG, now_s=clock.now_s)
+    return ModbusTcpGateway([drive]) if KINDS[kind].tcp else drive, lambda: drive.triggers
+
+
+def open_stage(kind: str, port: str, limits: Limits, clock: Clock) -> MotorStage:
+    """Open the driver on a port."""
+    if kind == "newport":
+        line = Line("theta_r", port, 57600, clock)
+        return NewportStage("theta_r", line, 1, "SMC100", limits, clock)
+    if kind == "zaber":
+        line = Line("theta_r", port, 115200, clock)
+        return ZaberStage("theta_r", line, 1, 1, MICROSTEPS_PER_DEG, limits, clock)
+    settings = OrientalSettings(port=port, steps_per_deg=STEPS_PER_DEG, limits=limits, parity="N")
+    return OrientalStage("theta_r", settings, clock)
