@@ -1,4 +1,4 @@
-"""Small scans: the demonstration with fewer angles, a small camera or changed entries."""
+"""Small scans derived from the demonstration, and simulated scenes for them."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ from instrument.config.load import Loaded, load_protocol
 from instrument.config.protocol import DriftCheck, References, WhiteTile
 from instrument.config.rig import Rig
 from instrument.record.reading import Reading
+from sim.scene.scene import Scene
 from tests.support.paths import CONFIGS
 
-SHRINK = 5
 
-
-def small_scan(rig: str = "bench_12bit", shrink: int = SHRINK) -> Loaded:
-    """The demo's foam on a rig file of configs, its camera with one pixel in 25 (or shrink^2)."""
+def small_scan(rig: str = "bench_12bit", shrink: int = 5) -> Loaded:
+    """The demonstration with ten points and 1/shrink of the camera's rows and columns."""
     path = CONFIGS / "rigs" / f"{rig}.yaml"
     demo = load_protocol(CONFIGS / "protocols" / "demo.yaml", path)
     sweep = {
@@ -41,12 +40,12 @@ def small_scan(rig: str = "bench_12bit", shrink: int = SHRINK) -> Loaded:
 
 
 def undated(readings: list[Reading]) -> list[Reading]:
-    """All but the date and a sum of times that is rounded otherwise; `time_s` stays."""
+    """Readings without what differs between equal scans: the date, and `free_s` by its rounding."""
     return [replace(r, time_utc="", free_s=0.0) for r in readings]
 
 
 def small_demo(folder: Path) -> Path:
-    """The demo's protocol in that folder, with two incidences and nine view angles."""
+    """Write the demonstration protocol with two incidences and nine view angles into `folder`."""
     text = (CONFIGS / "protocols" / "demo.yaml").read_text()
     text = text.replace("[30.0, 45.0, 60.0]", "[30.0, 60.0]").replace("num: 33", "num: 9")
     path = folder / "small.yaml"
@@ -55,7 +54,7 @@ def small_demo(folder: Path) -> Path:
 
 
 def changed(loaded: Loaded, rig: dict[str, Any] | None = None, **protocol: Any) -> Loaded:
-    """The same configuration with some entries replaced (not validated again)."""
+    """Copy of the configuration with some entries replaced, without validation."""
     return replace(
         loaded,
         rig=loaded.rig.model_copy(update=rig or {}),
@@ -64,7 +63,7 @@ def changed(loaded: Loaded, rig: dict[str, Any] | None = None, **protocol: Any) 
 
 
 def exact_rig(rig: Rig) -> Rig:
-    """The rig as its file says it is: true angles, sample on the axis, a constant lamp."""
+    """Copy of the rig without simulated errors: exact angles, sample on the axis, constant lamp."""
     axes = rig.axes.model_copy(
         update={
             n: rig.axes[n].model_copy(update={"u_deg": 0.0}) for n in ("theta_i", "dphi", "theta_r")
@@ -74,3 +73,13 @@ def exact_rig(rig: Rig) -> Rig:
         update={"sample_height_mm": 0.0, "lamp_drift_per_hour": 0.0}
     )
     return rig.model_copy(update={"axes": axes, "simulation": simulation})
+
+
+def simulated_scene(loaded: Loaded, theta_i: float = 45.0, theta_r: float = 0.0) -> Scene:
+    """Scene of the protocol's simulated sample at these angles, with dphi = 0."""
+    sample = loaded.protocol.simulated_sample
+    assert sample is not None
+    scene = Scene(loaded.rig, loaded.protocol, sample)
+    for axis, angle in (("theta_i", theta_i), ("dphi", 0.0), ("theta_r", theta_r)):
+        scene.set_axis(axis, angle)
+    return scene

@@ -11,11 +11,10 @@ from pathlib import Path
 import pytest
 
 from acquisition.results.finish import finish
-from acquisition.rig import open_devices
 from instrument.config.load import Loaded
-from instrument.errors import DeviceError, InputError, StorageError
+from instrument.errors import StorageError
 from instrument.record.record import Record
-from sim.faults.faults import VARIABLE, Faults
+from sim.faults.faults import VARIABLE
 from tests.support.command import gonio
 from tests.support.scans import small_scan
 
@@ -111,19 +110,3 @@ def without_date(table: str) -> list[list[str]]:
     rows = [line.split(",") for line in table.splitlines()]
     date = rows[0].index("time_utc")
     return [row[:date] + row[date + 1 :] for row in rows]
-
-
-@pytest.mark.parametrize(
-    "text", ["theta_r explodes at theta_r.wait 5", "theta_r stalls", "lamp sticks at lamp.light 0"]
-)
-def test_what_cannot_be_planned_is_refused_with_what_can(text: str) -> None:
-    with pytest.raises(InputError, match=r"allowed: DEVICE FAULT at\|after.*meets its limit"):
-        Faults(text)
-
-
-def test_a_sound_bench_has_no_faults(small: Loaded, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(VARIABLE, raising=False)
-    assert Faults.from_environment() is None
-    monkeypatch.setenv(VARIABLE, "camera is unplugged at camera.grab 1")
-    with pytest.raises(DeviceError, match="camera: not found"):
-        open_devices(small).camera.grab(1)
