@@ -23,14 +23,8 @@ from instrument.devices import Frame
 from instrument.errors import GonioError, InputError, StorageError
 from instrument.record.network_share import network_share
 from instrument.record.reading import Check, Preview, Reading
-from instrument.record.schema import KINDS, MARKS, SCHEMA_VERSION, TABLES, begin, connect
-from instrument.record.validation import (
-    NOT_BEGUN,
-    check_files,
-    check_schema,
-    check_values,
-    only_tables,
-)
+from instrument.record.schema import MARKS, begin, connect
+from instrument.record.validation import check_files, check_schema, check_values
 from instrument.text.atomic_file import full, make_folder, sync_folder, trouble
 
 FILE_NAME = "record.sqlite"
@@ -79,7 +73,7 @@ class Record(Closing):
         except (sqlite3.Error, UnicodeDecodeError) as error:
             raise _refused(error, path) from error
         try:
-            record._check(path)
+            check_values(record._db, path, check_schema(record._db, path))
         except (sqlite3.Error, UnicodeDecodeError) as error:  # names and texts of any bytes
             record.close()
             raise _refused(error, path) from error
@@ -87,20 +81,6 @@ class Record(Closing):
             record.close()
             raise
         return record
-
-    def _check(self, path: Path) -> None:
-        """Refuse a record that never began, is of another version, or that no scan wrote."""
-        if self._db.execute("SELECT COUNT(*) FROM sqlite_master").fetchone() == (0,):
-            raise InputError(f"{self.folder}: {NOT_BEGUN}")
-        only_tables(self._db, path)
-        version = self.meta("schema_version")
-        if version != str(SCHEMA_VERSION):
-            raise InputError(
-                f"{path}: schema version {version}; this program reads {SCHEMA_VERSION}: "
-                "use the version of the program that made the run"
-            )
-        check_schema(self._db, path, TABLES)
-        check_values(self._db, path, KINDS)
 
     @contextmanager
     def claimed(self) -> Iterator[None]:

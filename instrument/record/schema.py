@@ -1,69 +1,187 @@
-"""The record's tables, and how its file is opened and begun."""
+"""Schema of the run record: its tables, the allowed values of each column, and connecting to it.
+
+All tables are STRICT, and every rule is a CHECK whose name says what is allowed, so SQLite itself
+refuses other values when a row is written, and `PRAGMA quick_check` finds them in a file from
+elsewhere. What a released schema is like never changes: a change here needs a new SCHEMA_VERSION,
+and the old tables move to `older_versions`.
+"""
 
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Mapping
-from dataclasses import fields
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import get_args
+from typing import NamedTuple, get_args
 
 from instrument.devices import Surface
-from instrument.record.reading import Kind, Reading
-from instrument.record.validation import harden_connection
+from instrument.errors import InputError
+from instrument.record.reading import Kind
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
+MOST_BYTES = 128 * 1024**2  # of one text or picture; the largest camera's picture needs half of it
+_LEAST_SQLITE = (3, 37, 0)  # the first with STRICT tables
+_LARGEST = 1e30  # of any number that has no limit of its own
+_LARGEST_WHOLE = 2**53  # larger whole numbers are not exact as floats
 
-_TABLES = """
-CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
-CREATE TABLE device (role TEXT PRIMARY KEY, identity TEXT NOT NULL);
-CREATE TABLE setting (id INTEGER PRIMARY KEY, time_utc TEXT NOT NULL, role TEXT NOT NULL,
-                      name TEXT NOT NULL, value TEXT NOT NULL);
-CREATE TABLE event (id INTEGER PRIMARY KEY, time_utc TEXT NOT NULL, kind TEXT NOT NULL,
-                    text TEXT NOT NULL);
-CREATE TABLE dark (id INTEGER PRIMARY KEY, time_utc TEXT NOT NULL, exposure_s REAL NOT NULL,
-                   frames INTEGER NOT NULL, mean_dn REAL NOT NULL, noise_dn REAL NOT NULL);
-CREATE TABLE frame (step INTEGER NOT NULL, number INTEGER NOT NULL, exposure_s REAL NOT NULL,
-                    time_s REAL NOT NULL, device_time_s REAL, file TEXT,
-                    PRIMARY KEY (step, number));
-CREATE TABLE preview (step INTEGER PRIMARY KEY, caption TEXT NOT NULL, png BLOB NOT NULL,
-                      polygon TEXT NOT NULL);
-"""
-_SQL_TYPE = {"int": "INTEGER", "float": "REAL"}
-_COLUMNS = {f.name: _SQL_TYPE.get(str(f.type), "TEXT") for f in fields(Reading)}
 
-MARKS = ", ".join("?" * len(_COLUMNS))
+class Column(NamedTuple):
+    """A column, the SQL condition on its values ("" for none), and that condition in words."""
+
+    name: str
+    sql_type: str
+    condition: str
+    allowed: str
+    optional: bool = False
+
+    def definition(self, *, primary_key: bool) -> str:
+        """Return the column's definition in CREATE TABLE."""
+        sql = f"{self.name} {self.sql_type}" + " NOT NULL" * (not self.optional)
+        sql += " PRIMARY KEY" * primary_key
+        if self.condition:
+            sql += f' CONSTRAINT "{self.name}: {self.allowed}" CHECK ({self.condition})'
+        return sql
+
+    def sound(self) -> str:
+        """Return the SQL condition for type and value, for a table that enforces neither."""
+        sql = f"typeof({self.name}) = '{self.sql_type.lower()}'"
+        sql += f" AND ({self.condition})" * bool(self.condition)
+        return f"({self.name} IS NULL OR ({sql}))" if self.optional else f"({sql})"
+
+
+def _number(
+    name: str, low: float = -_LARGEST, high: float = _LARGEST, *, optional: bool = False
+) -> Column:
+    """Finite float; an optional one may be unknown: NaN, which SQLite stores as NULL."""
+    condition = f"{name} BETWEEN {low!r} AND {high!r}"
+    return Column(name, "REAL", condition, f"a number from {low:g} to {high:g}", optional)
+
+
+def _integer(name: str, low: int = 0, high: int = _LARGEST_WHOLE) -> Column:
+    condition = f"{name} BETWEEN {low} AND {high}"
+    return Column(name, "INTEGER", condition, f"a whole number from {low} to {high}")
+
+
+def _word(name: str, words: Iterable[str]) -> Column:
+    condition = f"{name} IN ({', '.join(map(repr, words))})"
+    return Column(name, "TEXT", condition, " or ".join(words))
+
+
+def _plain(name: str, *, optional: bool = False) -> Column:
+    """Text that reaches tables and terminals: no formula of a spreadsheet, no escape sequence."""
+    condition = (
+        f"length({name}) <= 1000 AND length({name}) = length(CAST({name} AS BLOB)) "
+        f"AND {name} NOT GLOB '*[^ -~]*' AND {name} NOT GLOB '[=+@-]*'"
+    )
+    allowed = "plain words in ASCII, up to 1000 characters, not beginning with = + - @"
+    return Column(name, "TEXT", condition, allowed, optional)
+
+
+def _text(name: str) -> Column:
+    return Column(name, "TEXT", "", "text in UTF-8")
+
+
+_ID = Column("id", "INTEGER", "", "a whole number")
+_COUNT_KEYS = "'steps', 'hidden'"
+_META_VALUE = Column(
+    "value",
+    "TEXT",
+    f"key NOT IN ({_COUNT_KEYS}) OR (length(CAST(value AS BLOB)) BETWEEN 1 AND 9 "
+    "AND length(value) = length(CAST(value AS BLOB)) AND value NOT GLOB '*[^0-9]*')",
+    f"a whole number of up to 9 digits for {_COUNT_KEYS}, else text in UTF-8".replace("'", ""),
+)
+_EXPOSURE_S = _number("exposure_s", 1e-9, 1e6)
+_READING = (
+    _integer("step"),
+    _word("kind", get_args(Kind)),
+    _word("surface", get_args(Surface)),
+    _number("theta_i_deg", 0.0, 89.5),
+    _number("dphi_deg", -360.0, 360.0),
+    _number("theta_r_deg", -89.5, 89.5),
+    _integer("lamp_setting"),
+    _integer("block"),
+    _number("signal_dn", optional=True),
+    _number("u_noise_dn", 0.0, optional=True),
+    _number("u_quantisation_dn", 0.0, optional=True),
+    _number("u_dark_dn", 0.0, optional=True),
+    _number("u_placement_dn", optional=True),
+    _number("u_texture_dn", 0.0, optional=True),
+    _EXPOSURE_S,
+    _integer("frames"),
+    _number("window_pixels", optional=True),
+    _integer("saturated_pixels"),
+    _number("peak_dn", optional=True),
+    _number("time_s", -1e9, 1e9),
+    _number("free_s", optional=True),
+    _plain("time_utc"),
+    _plain("flags"),
+)
+TABLES: dict[str, tuple[Column, ...]] = {
+    "meta": (_text("key"), _META_VALUE),
+    "device": (_text("role"), _text("identity")),
+    "setting": (_ID, _plain("time_utc"), _text("role"), _text("name"), _text("value")),
+    "event": (_ID, _plain("time_utc"), _text("kind"), _text("text")),
+    "dark": (
+        _ID,
+        _plain("time_utc"),
+        _EXPOSURE_S,
+        _integer("frames", 1),
+        _number("mean_dn"),
+        _number("noise_dn"),
+    ),
+    "frame": (
+        _integer("step"),
+        _integer("number"),
+        _EXPOSURE_S,
+        _number("time_s"),
+        _number("device_time_s", optional=True),
+        _plain("file", optional=True),
+    ),
+    "preview": (
+        _integer("step"),
+        _text("caption"),
+        Column("png", "BLOB", f"length(png) <= {MOST_BYTES}", f"bytes, at most {MOST_BYTES}"),
+        Column("polygon", "TEXT", "length(polygon) <= 10000", "JSON of up to 10000 characters"),
+    ),
+    "reading": _READING,
+    "drift_at_resume": (
+        _integer("before_step"),
+        _number("expected"),
+        _number("u_expected", 0.0),
+        _integer("jumped", 0, 1),
+        *_READING,
+    ),
+}
+"""All tables with their columns; the first column tells the rows of a table apart in messages."""
+
+MARKS = ", ".join("?" * len(_READING))
 """One `?` for each column of a reading."""
 
 
-_WORDS: dict[str, tuple[str, ...]] = {"kind": get_args(Kind), "surface": get_args(Surface)}
-
-KINDS = {f.name: _WORDS.get(f.name, str(f.type)) for f in fields(Reading)}
-"""What each column of a reading may hold: `int`, `float`, `str`, or one of the words."""
-
-
-def _reading_columns(key: str = "") -> str:
-    """A reading as columns; a float may be unknown, and is NULL then."""
-    rows = (
-        f"{name} {kind}" + (" PRIMARY KEY" if name == key else " NOT NULL" * (kind != "REAL"))
-        for name, kind in _COLUMNS.items()
-    )
-    return ", ".join(rows)
+def _create(table: str, columns: tuple[Column, ...]) -> str:
+    has_key = table not in ("frame", "drift_at_resume")
+    rows = [c.definition(primary_key=has_key and c is columns[0]) for c in columns]
+    rows += ["PRIMARY KEY (step, number)"] * (table == "frame")
+    return f"CREATE TABLE {table} (\n  " + ",\n  ".join(rows) + "\n) STRICT;\n"
 
 
-_READINGS = f"""
-CREATE TABLE reading ({_reading_columns(key="step")});
-CREATE TABLE drift_at_resume (before_step INTEGER NOT NULL, expected REAL NOT NULL,
-                              u_expected REAL NOT NULL, jumped INTEGER NOT NULL,
-                              {_reading_columns()});
-"""
+SQL = "".join(_create(table, columns) for table, columns in TABLES.items())
+"""The statements that make the tables, each ending in a semicolon."""
 
-TABLES = _TABLES + _READINGS
-"""The SQL that makes all of them."""
+
+def harden_connection(database: sqlite3.Connection) -> None:
+    """Keep SQLite from running code stored in the file and from loading huge values."""
+    database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES)
+    database.execute("PRAGMA trusted_schema=OFF")
+    database.execute("PRAGMA cell_size_check=ON")
 
 
 def connect(path: Path) -> sqlite3.Connection:
-    """Open a file as a record: with a write-ahead log, each commit on disk when it returns."""
+    """Open a file as a record: hardened, with a write-ahead log, each commit flushed to disk."""
+    if sqlite3.sqlite_version_info < _LEAST_SQLITE:
+        raise InputError(
+            f"{path}: SQLite {sqlite3.sqlite_version} of this Python cannot hold a record; "
+            "needed: 3.37 or later: use another Python"
+        )
     database = sqlite3.connect(path)
     try:
         harden_connection(database)
@@ -76,10 +194,10 @@ def connect(path: Path) -> sqlite3.Connection:
 
 
 def begin(database: sqlite3.Connection, meta: Mapping[str, str]) -> None:
-    """All tables and the run's description in one transaction: a record is whole or none."""
+    """Create all tables and the run's description in one transaction: a whole record or none."""
     database.execute("BEGIN")
     with database:
-        for statement in TABLES.split(";"):
+        for statement in SQL.split(";"):
             database.execute(statement)
         rows = {"schema_version": str(SCHEMA_VERSION), **meta}
         database.executemany("INSERT INTO meta VALUES (?, ?)", rows.items())

@@ -9,22 +9,9 @@ from pathlib import Path
 import pytest
 
 from instrument.errors import InputError
-from instrument.record.network_share import network_share
-from instrument.record.reading import Preview, Reading
+from instrument.record.reading import Preview
 from instrument.record.record import FILE_NAME, Record
-
-
-def reading(step: int = 0, **changes: object) -> Reading:
-    values: dict[str, object] = {
-        "step": step, "kind": "point", "surface": "sample", "theta_i_deg": 30.0, "dphi_deg": 0.0,
-        "theta_r_deg": -20.0, "lamp_setting": 0, "block": 0, "signal_dn": 2000.5,
-        "u_noise_dn": 0.1, "u_quantisation_dn": 0.01, "u_dark_dn": 0.02, "u_placement_dn": -0.4,
-        "u_texture_dn": 0.1,
-        "exposure_s": 0.032, "frames": 4, "window_pixels": 31000.25, "saturated_pixels": 0,
-        "peak_dn": 2500.0, "time_s": 12.5, "free_s": 12.5, "flags": "",
-        "time_utc": "2026-01-01T00:00:00+00:00",
-    }  # fmt: skip
-    return Reading(**{**values, **changes})  # type: ignore[arg-type]  # a test's shorthand
+from tests.support.storage.sample_records import reading
 
 
 def test_what_was_added_is_read_back_as_it_was(tmp_path: Path) -> None:
@@ -53,7 +40,7 @@ def test_another_tool_reads_it_while_the_scan_runs(tmp_path: Path) -> None:
         assert other.execute("SELECT theta_r_deg FROM reading").fetchall() == [(-20.0,)]
         assert other.execute("PRAGMA journal_mode").fetchone() == ("wal",)
         other.close()
-        assert record.meta("schema_version") == "3"
+        assert record.meta("schema_version") == "4"
 
 
 def test_a_value_that_could_not_be_measured_stays_unknown(tmp_path: Path) -> None:
@@ -84,7 +71,7 @@ def test_no_record_a_foreign_file_and_another_version_are_named(tmp_path: Path) 
         Record.open(tmp_path)
     with Record.create(tmp_path / "run", {}) as record:
         record.set_meta("schema_version", "99")
-    with pytest.raises(InputError, match="schema version 99; this program reads 3"):
+    with pytest.raises(InputError, match="schema version 99; this program reads 3 and 4"):
         Record.open(tmp_path / "run")
 
 
@@ -96,26 +83,6 @@ def test_one_process_at_a_time_scans_into_a_run(tmp_path: Path) -> None:
                 raise AssertionError("claimed twice")
         with record.claimed() as again:
             assert again is None
-
-
-MOUNTS = r"""22 1 8:1 / / rw,relatime shared:1 - ext4 /dev/sda1 rw
-30 22 0:50 / /lab rw,relatime shared:2 - nfs4 server:/lab rw
-31 30 8:2 / /lab/local rw - xfs /dev/sdb1 rw
-32 22 0:51 / /with\040blank rw - cifs //server/share rw
-33 22 0:52 / /far rw - fuse.sshfs me@server: rw
-broken line
-"""
-
-
-@pytest.mark.parametrize(
-    ("folder", "kind"),
-    [("/home/run", None), ("/lab/run", "nfs4"), ("/lab/local/run", None), ("/laboratory", None),
-     ("/with blank/a/b", "cifs"), ("/far", "fuse.sshfs")],
-)  # fmt: skip
-def test_a_network_share_is_told_by_its_mount(tmp_path: Path, folder: str, kind: str) -> None:
-    (tmp_path / "mounts").write_text(MOUNTS)
-    assert network_share(Path(folder), tmp_path / "mounts") == kind
-    assert network_share(Path(folder), tmp_path / "none") is None
 
 
 def test_no_record_on_a_network_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

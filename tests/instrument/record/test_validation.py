@@ -1,116 +1,90 @@
-"""A stranger's run is data: its record runs nothing, breaks nothing, and reaches no other file."""
+"""Validation of records from elsewhere: damage, forged values and changed schemas are refused."""
 
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from acquisition.commands.scan import report_run, resume_run
-from acquisition.results.sources import Wanted, read_source
-from instrument.errors import GonioError, InputError
+from instrument.errors import InputError
+from instrument.record import validation
 from instrument.record.record import FILE_NAME, Record
-from tests.support.command import gonio
-from tests.support.paths import CONFIGS
+from tests.support.storage.sample_records import small_record
 from tests.support.strangers.mutations import Mutator, feed
-from tests.support.strangers.run_folders import REFUSED, SCRIPT, Sent, copy_of
+from tests.support.strangers.run_folders import REFUSED, Sent, copy_of
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A sound run: the demo with few view angles."""
-    folder = tmp_path_factory.mktemp("run")
-    text = (CONFIGS / "protocols" / "demo.yaml").read_text().replace("num: 33", "num: 5")
-    protocol = folder / "few.yaml"
-    protocol.write_text(text.replace("../rigs/", f"{CONFIGS / 'rigs'}/"))
-    done = gonio("run", protocol, "--out", folder / "run")
-    assert done.returncode == 0, done.stderr
-    return folder / "run"
+@pytest.fixture(params=[4, 3])
+def sent(tmp_path: Path, request: pytest.FixtureRequest) -> Sent:
+    """A small record that was sent, of each schema version."""
+    small_record(tmp_path / "run").close()
+    return copy_of(tmp_path / "run", tmp_path, request.param)
 
 
-@pytest.fixture
-def sent(run: Path, tmp_path: Path) -> Sent:
-    return copy_of(run, tmp_path)
-
-
-WAYS: dict[str, Callable[[Path], object]] = {
-    "report": lambda folder: report_run(folder, as_json=True),
-    "resume": lambda folder: resume_run(folder, yes=True, as_json=True),
-    "fit": lambda folder: read_source(folder, Wanted(format="run")),
-}
+def test_a_sound_record_of_each_version_opens(sent: Sent) -> None:
+    with Record.open(sent.folder) as record:
+        assert [r.step for r in record.readings()] == [0, 1, 2, 3, 4]
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_a_record_that_no_scan_can_have_written_is_refused(sent: Sent, what: str) -> None:
-    """By every command, before anything is done with it, and no other file is touched."""
+def test_a_forged_or_damaged_record_is_refused_by_name(sent: Sent, what: str) -> None:
     change, words = REFUSED[what]
     change(sent)
-    before = _others(sent)
-    for way in WAYS.values():
-        with pytest.raises(InputError) as refused:
-            way(sent.folder)
-        assert words in str(refused.value)
-        assert str(sent.folder) in str(refused.value)
-    assert _others(sent) == before
-    assert sent.victim.read_text() == "my own\n"
+    with pytest.raises(InputError) as refused:
+        Record.open(sent.folder)
+    assert words in str(refused.value)
+    assert str(sent.folder) in str(refused.value)
 
 
-def _others(sent: Sent) -> dict[str, bytes]:
-    """Everything but the database, which SQLite may recover."""
-    return {
-        path.name: path.read_bytes()
-        for path in sent.folder.parent.rglob("*")
-        if path.is_file() and not path.name.startswith(FILE_NAME)
-    }
+@pytest.mark.parametrize(
+    ("old", "new"), [(") STRICT", ")"), (" CHECK (signal_dn BETWEEN -1e+30 AND 1e+30)", "")]
+)
+def test_a_schema_with_fewer_rules_is_unknown(tmp_path: Path, old: str, new: str) -> None:
+    """Nothing in it would be verified."""
+    small_record(tmp_path / "run").close()
+    sent = copy_of(tmp_path / "run", tmp_path)
+    sent.widen(old, new)
+    with pytest.raises(InputError, match="which this program did not make so"):
+        Record.open(sent.folder)
 
 
-def test_the_command_refuses_a_stranger_s_record(sent: Sent) -> None:
-    change, words = REFUSED["a view without end in place of meta"]
-    change(sent)
-    done = gonio("resume", sent.folder, "--yes")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert words in done.stderr
-    assert "Traceback" not in done.stderr
+def test_a_schema_of_one_version_under_the_number_of_another_is_refused(sent: Sent) -> None:
+    sent.forge("UPDATE meta SET value = 7 - value WHERE key = 'schema_version'")
+    with pytest.raises(InputError, match="holds the table 'meta', which this program did not make"):
+        Record.open(sent.folder)
 
 
-def test_what_cannot_harm_is_shown_as_it_is(sent: Sent) -> None:
-    """HTML in captions, pictures and devices; a count of steps that lies; a log left over."""
-    sent.sql(
-        f"UPDATE preview SET caption = '{SCRIPT}', png = CAST('{SCRIPT}' AS BLOB)",
-        f"UPDATE device SET identity = '{SCRIPT}'",
-        f"UPDATE meta SET value = '{SCRIPT}' WHERE key = 'program_version'",
-        "UPDATE meta SET value = '99999' WHERE key = 'steps'",
+def test_a_wrong_value_is_named_with_table_row_column_and_what_is_allowed(sent: Sent) -> None:
+    sent.forge("UPDATE drift_at_resume SET theta_r_deg = -95.0")
+    words = (
+        f"{sent.record}: drift_at_resume 3: theta_r_deg is -95.0; allowed: a number from -89.5 "
+        "to 89.5: take an undamaged copy of the run"
     )
-    (sent.folder / f"{FILE_NAME}-wal").write_bytes(b"left over" * 999)
-    report_run(sent.folder, as_json=True)
-    page = (sent.folder / "report.html").read_text()
-    assert "<script" not in page.lower()
-    assert "&lt;script&gt;" in page
-    assert "This picture cannot be read." in page
-    assert "of 99999 readings" in page
+    with pytest.raises(InputError) as refused:
+        Record.open(sent.folder)
+    assert str(refused.value) == words
 
 
-def test_results_replace_links_and_do_not_follow_them(sent: Sent) -> None:
-    names = ("measurements.csv", "fit.json", "report.html")
-    for name in names:
-        sent.link(name)
-    report_run(sent.folder, as_json=True)
-    assert sent.victim.read_text() == "my own\n"
-    assert not any((sent.folder / name).is_symlink() for name in names)
-
-
-def test_a_picture_too_large_is_refused(sent: Sent, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_previews_too_large_together_are_refused(
+    sent: Sent, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The limits themselves are hundreds of MB; here they are smaller, so that less is written."""
-    monkeypatch.setattr("instrument.record.validation._PICTURES", (9_000_000, 1_000_000))
-    sent.sql("UPDATE preview SET png = zeroblob(2000000)")
-    with pytest.raises(InputError, match="pictures of 2000000 bytes; allowed: 1000000"):
+    monkeypatch.setattr(validation, "_MOST_PREVIEW_BYTES", 9_000_000)
+    sent.forge("UPDATE preview SET png = zeroblob(2000000)")
+    with pytest.raises(InputError, match="pictures of 10000000 bytes; allowed: 9000000"):
+        Record.open(sent.folder)
+
+
+def test_a_text_too_large_is_refused(sent: Sent, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("instrument.record.schema.MOST_BYTES", 1_000_000)
+    sent.forge("UPDATE event SET text = CAST(zeroblob(2000000) AS TEXT)")
+    with pytest.raises(InputError, match="not a record of this program: string or blob too big"):
         Record.open(sent.folder)
 
 
 def test_more_than_can_be_reduced_is_refused(sent: Sent, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("instrument.record.validation.MOST_WORK", 10)
+    monkeypatch.setattr(validation, "MOST_WORK", 1)
     with pytest.raises(InputError, match=r"readings, .* are too many"):
         Record.open(sent.folder)
 
@@ -147,26 +121,3 @@ def test_any_damage_to_a_record_gives_a_result_or_an_input_error(sent: Sent, slo
         return bytes(data)
 
     feed(spoil, 1000 if slow else 30, read)
-
-
-def _outcome(way: Callable[[Path], object], folder: Path) -> str:
-    try:
-        way(folder)
-    except GonioError as error:
-        return type(error).__name__
-    return "a result"
-
-
-@pytest.mark.parametrize(
-    "change", ["u_noise_dn = 0.0", "signal_dn = 1e30", "signal_dn = -1e-30", "time_s = -step"]
-)
-def test_values_that_are_no_measurement_end_with_a_name(sent: Sent, change: str) -> None:
-    """In due form, but impossible: whatever comes of it is a result or an error with a name."""
-    sent.sql(f"UPDATE reading SET {change}")
-    assert _outcome(WAYS["fit"], sent.folder) in ("a result", "NotDetermined")
-
-
-def test_a_report_of_values_that_are_no_measurement(sent: Sent) -> None:
-    sent.sql("UPDATE reading SET u_noise_dn = 0.0, u_quantisation_dn = 0.0, u_texture_dn = 0.0")
-    report_run(sent.folder, as_json=True)
-    assert "No model was fitted" in (sent.folder / "report.html").read_text()

@@ -1,4 +1,4 @@
-"""Run folders as a stranger may send them: one sound run, and what can be done to its record."""
+"""Run folders from strangers: one sound run, as each schema version, and changes to its record."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from instrument.record.record import FILE_NAME
+from tests.support.command import gonio
+from tests.support.paths import CONFIGS
+from tests.support.storage.older_records import as_version_3
 
 SCRIPT = "<script>alert(1)</script>"
 
@@ -27,10 +30,31 @@ class Sent:
         return self.folder / FILE_NAME
 
     def sql(self, *statements: str) -> None:
+        """Run statements as any SQLite tool does: the rules of the tables hold."""
         with closing(sqlite3.connect(self.record)) as database:
             for statement in statements:
                 database.execute(statement)
             database.commit()
+
+    def forge(self, *statements: str) -> None:
+        """Run statements as if the tables had no rules, and leave their schema as it was."""
+        with closing(sqlite3.connect(self.record, isolation_level=None)) as database:
+            own = database.execute("SELECT sql, name FROM sqlite_schema WHERE sql IS NOT NULL")
+            texts = own.fetchall()
+            lax = [(text.replace(" STRICT", "").replace(" NOT NULL", ""), n) for text, n in texts]
+            database.execute("PRAGMA ignore_check_constraints = ON")
+            _write_schema(database, lax)
+            for statement in statements:
+                database.execute(statement)
+            _write_schema(database, texts)
+
+    def widen(self, old: str, new: str) -> None:
+        """Change the text of the schema itself, so that SQLite enforces fewer rules."""
+        with closing(sqlite3.connect(self.record, isolation_level=None)) as database:
+            rows = database.execute("SELECT sql, name FROM sqlite_schema").fetchall()
+            changed = [(text.replace(old, new), name) for text, name in rows if old in (text or "")]
+            assert changed
+            _write_schema(database, changed)
 
     def link(self, name: str) -> None:
         """Put a link to the receiver's file in place of one of the folder's."""
@@ -38,11 +62,29 @@ class Sent:
         (self.folder / name).symlink_to(self.victim)
 
 
-def copy_of(run: Path, to: Path) -> Sent:
-    """The run as it was sent, in its own folder of `to`."""
+def _write_schema(database: sqlite3.Connection, texts: list[tuple[str, str]]) -> None:
+    database.execute("PRAGMA writable_schema = ON")
+    database.executemany("UPDATE sqlite_schema SET sql = ? WHERE name = ?", texts)
+    database.execute("PRAGMA writable_schema = RESET")  # has the tables read anew
+
+
+def run_few_points(folder: Path) -> Path:
+    """Run the demo with few view angles; returns the run's folder, in `folder`."""
+    text = (CONFIGS / "protocols" / "demo.yaml").read_text().replace("num: 33", "num: 5")
+    protocol = folder / "few.yaml"
+    protocol.write_text(text.replace("../rigs/", f"{CONFIGS / 'rigs'}/"))
+    done = gonio("run", protocol, "--out", folder / "run")
+    assert done.returncode == 0, done.stderr
+    return folder / "run"
+
+
+def copy_of(run: Path, to: Path, version: int = 4) -> Sent:
+    """The run as it was sent, in its own folder of `to`, its record of that schema version."""
     shutil.copytree(run, to / "sent")
     victim = to / "mine.txt"
     victim.write_text("my own\n")
+    if version == 3:
+        as_version_3(to / "sent")
     return Sent(to / "sent", victim)
 
 
@@ -62,8 +104,8 @@ def _view_of_meta(sent: Sent) -> None:
     )
 
 
-def _lenient(column: str, value: str) -> Callable[[Sent], None]:
-    return lambda sent: sent.sql(f"UPDATE reading SET {column} = {value} WHERE step = 2")
+def _forged(column: str, value: str) -> Callable[[Sent], None]:
+    return lambda sent: sent.forge(f"UPDATE reading SET {column} = {value} WHERE step = 2")
 
 
 def _damaged(sent: Sent) -> None:
@@ -92,41 +134,69 @@ REFUSED: dict[str, tuple[Callable[[Sent], None], str]] = {
     ),
     "a further table": (lambda sent: sent.sql("CREATE TABLE more (x)"), "holds the table 'more'"),
     "other columns": (
-        lambda sent: sent.sql("ALTER TABLE dark ADD COLUMN x AS (zeroblob(1000000000))"),
+        lambda sent: sent.sql("ALTER TABLE dark ADD COLUMN x BLOB AS (zeroblob(1000000000))"),
         "holds the table 'dark'",
     ),
     "a table missing": (lambda sent: sent.sql("DROP TABLE preview"), "has no 'preview'"),
     "another version": (
-        lambda sent: sent.sql("UPDATE meta SET value = '1' WHERE key = 'schema_version'"),
+        lambda sent: sent.forge("UPDATE meta SET value = '1' WHERE key = 'schema_version'"),
         "schema version 1; this program reads",
     ),
-    "text for a number": (_lenient("signal_dn", "'many'"), "signal_dn is 'many'"),
-    "bytes for a number": (_lenient("frames", "x'00'"), "frames is b'\\x00'"),
-    "a number for text": (_lenient("flags", "x'ff'"), "flags is b'\\xff'"),
-    "text that is not UTF-8": (_lenient("flags", "CAST(x'ff' AS TEXT)"), "not a record of this"),
-    "a negative step": (_lenient("step", "-1"), "step is -1; allowed: a whole number from 0"),
-    "no angle": (_lenient("theta_r_deg", "NULL"), "theta_r_deg is None"),
-    "an angle past the horizon": (_lenient("theta_i_deg", "95.0"), "allowed: a number from 0 to"),
-    "no exposure": (_lenient("exposure_s", "0.0"), "exposure_s is 0.0"),
-    "an infinite signal": (_lenient("signal_dn", "9e999"), "signal_dn is inf"),
-    "an unknown kind": (_lenient("kind", "'x'"), "kind is 'x'; allowed: point or tile or drift"),
-    "a formula": (_lenient("flags", "'=cmd|x!A1'"), "flags is '=cmd|x!A1'; allowed: plain words"),
-    "a command to the terminal": (_lenient("flags", "char(27) || '[2J'"), "flags is '\\x1b[2J'"),
-    "a formula for a time": (_lenient("time_utc", "'+1'"), "time_utc is '+1'"),
+    "a version that is no text": (
+        lambda sent: sent.forge("UPDATE meta SET value = x'34' WHERE key = 'schema_version'"),
+        "schema version b'4'; this program reads",
+    ),
+    "no version": (
+        lambda sent: sent.sql("DELETE FROM meta WHERE key = 'schema_version'"),
+        "schema version None; this program reads",
+    ),
+    "a column without its rule": (
+        lambda sent: sent.widen("signal_dn REAL", "signal_dn BLOB"),
+        "holds the table 'reading', which this program did not make so",
+    ),
+    "text for a number": (_forged("signal_dn", "'many'"), "signal_dn is 'many'"),
+    "bytes for a number": (_forged("frames", "x'00'"), "frames is b'\\x00'"),
+    "a number for text": (_forged("flags", "x'ff'"), "flags is b'\\xff'"),
+    "text that is not UTF-8": (_forged("flags", "CAST(x'ff' AS TEXT)"), "not a record of this"),
+    "a negative step": (_forged("step", "-1"), "step is -1; allowed: a whole number from 0"),
+    "no angle": (_forged("theta_r_deg", "NULL"), "theta_r_deg is None"),
+    "an angle past the horizon": (_forged("theta_i_deg", "95.0"), "allowed: a number from 0 to"),
+    "no exposure": (_forged("exposure_s", "0.0"), "exposure_s is 0.0"),
+    "an infinite signal": (_forged("signal_dn", "9e999"), "signal_dn is inf"),
+    "an unknown kind": (_forged("kind", "'x'"), "kind is 'x'; allowed: point or tile or drift"),
+    "a formula": (_forged("flags", "'=cmd|x!A1'"), "flags is '=cmd|x!A1'; allowed: plain words"),
+    "a command to the terminal": (_forged("flags", "char(27) || '[2J'"), "flags is '\\x1b[2J'"),
+    "a formula for a time": (_forged("time_utc", "'+1'"), "time_utc is '+1'"),
     "two drift checks at once": (
-        lambda sent: sent.sql("UPDATE reading SET time_s = 1.0"),
+        lambda sent: sent.forge("UPDATE reading SET time_s = 1.0"),
         "a second drift check at 1.0 s",
     ),
-    "meta that is no number": (
-        lambda sent: sent.sql("UPDATE meta SET value = 'x' WHERE key = 'steps'"),
-        "meta 'steps' is 'x'; allowed: a whole number",
+    "a negative uncertainty": (_forged("u_noise_dn", "-1.0"), "u_noise_dn is -1.0; allowed"),
+    "a null character": (_forged("flags", "'a' || char(0) || 'b'"), "flags is 'a"),
+    "a count with a null character": (
+        lambda sent: sent.forge("UPDATE meta SET value = '1' || char(0) WHERE key = 'steps'"),
+        "meta 'steps': value is '1",
     ),
-    "a dark of nothing": (lambda sent: sent.sql("UPDATE dark SET mean_dn = 'x'"), "dark 1 holds"),
+    "an event that is not UTF-8": (
+        lambda sent: sent.forge("UPDATE event SET text = CAST(x'ff' AS TEXT)"),
+        "not a record of this program",
+    ),
+    "meta that is no number": (
+        lambda sent: sent.forge("UPDATE meta SET value = 'x' WHERE key = 'steps'"),
+        "meta 'steps': value is 'x'; allowed: a whole number",
+    ),
+    "a dark of nothing": (
+        lambda sent: sent.forge("UPDATE dark SET mean_dn = 'x'"),
+        "dark 1: mean_dn is 'x'; allowed: a number from",
+    ),
     "an outline that is none": (
-        lambda sent: sent.sql(f"UPDATE preview SET polygon = '{'[' * 5000}'"),
+        lambda sent: sent.forge(f"UPDATE preview SET polygon = '{'[' * 5000}'"),
         "no outline that can be read",
     ),
-    "a picture that is text": (lambda sent: sent.sql("UPDATE preview SET png = 'x'"), "no bytes"),
+    "a picture that is text": (
+        lambda sent: sent.forge("UPDATE preview SET png = 'x'"),
+        "png is 'x'; allowed: bytes",
+    ),
     "damaged pages": (_damaged, "record.sqlite: "),
     "half the file": (
         lambda sent: sent.record.write_bytes(sent.record.read_bytes()[:10_000]),

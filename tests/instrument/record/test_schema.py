@@ -1,0 +1,108 @@
+"""The schema of the record: unchanging, one column for each value, enforced when a row is written.
+
+The rules against forged files are tested in `test_validation`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from instrument.errors import InputError
+from instrument.record import schema
+from instrument.record.older_versions import OLDER_SQL
+from instrument.record.reading import Check, Reading
+from instrument.record.record import Record
+from tests.support.storage.sample_records import reading
+
+
+@pytest.fixture
+def database() -> Iterator[sqlite3.Connection]:
+    with closing(sqlite3.connect(":memory:")) as database:
+        database.executescript(schema.SQL)
+        yield database
+
+
+DIGESTS = {
+    3: "9f19a8226c2bf34aba7f2e90b0857037188d10962a30af3a6da4e589df4eeab4",
+    4: "3ca133c29e7090078baff85f88ef8f3e97e1c13f0aecddd88d0414542926cf20",
+}
+
+
+def digest(sql: str) -> str:
+    """Digest of the tables' texts as SQLite keeps them."""
+    with closing(sqlite3.connect(":memory:")) as database:
+        database.executescript(sql)
+        rows = database.execute("SELECT name, sql FROM sqlite_schema ORDER BY name").fetchall()
+        return hashlib.sha256(repr(rows).encode()).hexdigest()
+
+
+def test_the_schema_of_each_version_is_what_it_was_when_released() -> None:
+    """A record is recognised by the exact text: whoever changes it needs a new version."""
+    texts = {**OLDER_SQL, schema.SCHEMA_VERSION: schema.SQL}
+    assert {version: digest(text) for version, text in texts.items()} == DIGESTS
+
+
+def test_a_reading_has_a_column_for_each_value_in_order() -> None:
+    values = [f.name for f in fields(Reading)]
+    assert [column.name for column in schema.TABLES["reading"]] == values
+    own = [f.name for f in fields(Check) if f.name != "reading"]
+    assert [column.name for column in schema.TABLES["drift_at_resume"]] == own + values
+    types = {"INTEGER": "int", "REAL": "float", "TEXT": "str"}
+    for column, field in zip(schema.TABLES["reading"], fields(Reading), strict=True):
+        assert types[column.sql_type] == {"Kind": "str", "Surface": "str"}.get(
+            str(field.type), field.type
+        )
+
+
+def test_every_table_is_strict_and_every_constraint_named(database: sqlite3.Connection) -> None:
+    tables = database.execute("SELECT name, strict FROM pragma_table_list").fetchall()
+    assert {
+        name: strict for name, strict in tables if not name.startswith("sqlite_")
+    } == dict.fromkeys(schema.TABLES, 1)
+    for (sql,) in database.execute("SELECT sql FROM sqlite_schema WHERE sql IS NOT NULL"):
+        assert sql.count(" CHECK (") == sql.count(" CONSTRAINT ")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"theta_i_deg": 95.0}, "theta_i_deg: a number from 0 to 89.5"),
+        ({"signal_dn": float("inf")}, "signal_dn: a number from"),
+        ({"u_noise_dn": -1.0}, "u_noise_dn: a number from 0 to"),
+        ({"frames": -1}, "frames: a whole number from 0 to"),
+        ({"kind": "x"}, "kind: point or tile or drift"),
+        ({"flags": "=1"}, "flags: plain words in ASCII"),
+        ({"flags": "é"}, "flags: plain words in ASCII"),
+        ({"theta_r_deg": float("nan")}, "NOT NULL constraint failed: reading.theta_r_deg"),
+        ({"signal_dn": "many"}, "cannot store TEXT value in REAL column reading.signal_dn"),
+    ],
+)
+def test_a_value_that_is_not_allowed_cannot_be_written(
+    tmp_path: Path, changes: dict[str, object], words: str
+) -> None:
+    """SQLite names the constraint, which says what is allowed."""
+    with (
+        Record.create(tmp_path / "run", {}) as record,
+        pytest.raises(sqlite3.IntegrityError, match=words),
+    ):
+        record.add_reading(reading(**changes))  # type: ignore[arg-type]  # a test's shorthand
+
+
+def test_one_preview_has_at_most_128_mb(database: sqlite3.Connection) -> None:
+    with pytest.raises(sqlite3.IntegrityError, match="png: bytes, at most 134217728"):
+        database.execute("INSERT INTO preview VALUES (0, '', zeroblob(134217729), '[]')")
+
+
+def test_a_python_with_an_old_sqlite_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sqlite3, "sqlite_version_info", (3, 36, 0))
+    with pytest.raises(InputError, match=r"needed: 3\.37 or later: use another Python"):
+        Record.create(tmp_path / "run", {})
