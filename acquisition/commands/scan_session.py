@@ -86,7 +86,7 @@ def _write_down(record: Record, notes: EventLogHandler, clock: Clock, kind: str,
 
 def _go_on(record: Record, notes: EventLogHandler) -> str:
     """What is not safe, what is, and the command that goes on."""
-    where = record.where()
+    where = record.current_folder()
     if where is None:
         return f"{_unsafe(notes)}Nothing is left to go on from"
     safe = f"{len(record.readings())} readings are safe in {where}"

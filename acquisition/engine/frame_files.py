@@ -10,7 +10,7 @@ from acquisition.plan.plan import Plan
 from instrument.config.load import Loaded
 from instrument.devices import Frame
 from instrument.errors import InputError, StorageError
-from instrument.text.atomic_file import make_folder, trouble, write_whole
+from instrument.text.atomic_file import explain_os_error, make_folder, write_whole
 
 FOLDER = "frames"
 
@@ -28,7 +28,7 @@ def keep(frames: Sequence[Frame], step: int, run: Path) -> tuple[str, ...]:
         for name, frame in zip(names, frames, strict=True):
             write_whole(run / name, cv2.imencode(".tiff", frame.image)[1].tobytes())
     except OSError as error:
-        raise StorageError(f"{run / FOLDER}: {trouble(error, run)}") from error
+        raise StorageError(f"{run / FOLDER}: {explain_os_error(error, run)}") from error
     return names
 
 

@@ -1,1 +1,5 @@
-"""instrument/config."""
+"""Configuration: rig and protocol files in YAML, as frozen pydantic models.
+
+Open `rig` and `protocol` first, which state what a file may hold; `load` reads the files and
+reports every mistake with its place.
+"""

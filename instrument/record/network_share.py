@@ -1,7 +1,7 @@
-"""On which kind of file system a folder lies: the record's write-ahead log needs a local one.
+"""Detection of network file systems, on which SQLite's write-ahead log is not safe.
 
-SQLite's documentation of the write-ahead log: all processes must be on the same computer; it does
-not work over a network file system.
+SQLite's documentation of the write-ahead log: "All processes using a database must be on the same
+host computer; WAL does not work over a network filesystem."
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ _FUSE_NETWORK = frozenset(
 
 
 def network_share(folder: Path, mounts: Path = _MOUNTS) -> str | None:
-    """The network file system that `folder` lies on or would be made on; None on a local disk.
+    """Return the network file system on which `folder` is or would be made; None on a local disk.
 
-    None, too, where the system keeps no list of its mounts.
+    None, too, if the system keeps no list of its mounts.
     """
     try:
         lines = mounts.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return None
     place = folder.resolve()
-    kinds = dict(filter(None, map(_mount, lines)))  # of one place the last mount is what is seen
+    kinds = dict(filter(None, map(_mount, lines)))  # the last mount hides earlier ones
     nearest = next((kinds[str(p)] for p in (place, *place.parents) if str(p) in kinds), "")
     return nearest if nearest in _NETWORK | _FUSE_NETWORK else None
 
 
 def _mount(line: str) -> tuple[str, str] | None:
-    """Where a line of mountinfo mounts what kind of file system; see proc(5)."""
+    """Return mount point and file system of a line of mountinfo, as in proc(5)."""
     left, found, right = line.partition(" - ")
     fields = left.split(" ")
     if not found or len(fields) < 5:
@@ -43,5 +43,5 @@ def _mount(line: str) -> tuple[str, str] | None:
 
 
 def _unescaped(text: str) -> str:
-    """Blanks and the like stand as three octal digits."""
+    """Replace the octal escapes of mountinfo, such as `\\040` for a blank."""
     return re.sub(r"\\([0-7]{3})", lambda octal: chr(int(octal[1], 8)), text)

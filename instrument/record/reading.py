@@ -1,4 +1,4 @@
-"""What one row of the run record is: a measured geometry, a drift check at a resume, a picture."""
+"""Rows of the run record: a measured geometry, a drift check at a resume, a preview."""
 
 from __future__ import annotations
 
@@ -12,17 +12,18 @@ Kind = Literal["point", "tile", "drift"]
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One measured geometry, in counts: the mean of the window, its uncertainties, its flags.
+    """One measured geometry in counts (DN): the mean over the window, its uncertainties, its flags.
 
     `step` is its number in the plan. Angles in degrees, theta_r signed. `signal_dn` is the
-    area-weighted mean of the window over all frames less the dark, cos^4 divided out; the u are
-    standard uncertainties of it: `u_noise_dn` of photons and read-out, `u_quantisation_dn` of
-    rounding the frames to whole counts, `u_dark_dn` of the dark (the same for all readings
-    of one exposure), `u_placement_dn` of how well the sample stands on the axis (signed:
-    one placement shifts all its readings together) and `u_texture_dn` of what that leaves out.
-    `lamp_setting` numbers the places of the lamp, `block` the times it was set by hand.
-    `time_s` is the scan's time at the end of its frames, without the times that the scan stood
-    still; at `free_s` the rig was free to go on, its dark taken.
+    area-weighted mean over the window and all frames, dark subtracted, divided by cos^4. The u are
+    its standard uncertainties: `u_noise_dn` from photon and read-out noise, `u_quantisation_dn`
+    from rounding the frames to whole counts, `u_dark_dn` from the dark (shared by all readings of
+    one exposure), `u_placement_dn` from the position of the sample on the axis (signed: one
+    placement shifts all its readings together), and `u_texture_dn` from the texture at the
+    window's edge, to second order of the placement. `lamp_setting` counts the positions of the
+    lamp, `block` the times that it was set by hand. `time_s` is the scan time at the end of the
+    frames, without interruptions of the scan; `free_s` is the time at which the rig could move
+    on, the dark having been taken.
     """
 
     step: int
@@ -52,11 +53,11 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """The drift reference, measured again when a scan goes on; `reading.step` is what it repeats.
+    """Drift check at a resume; `reading.step` is the drift check of the plan that it repeats.
 
-    `before_step`: the first step of the plan that comes after it. `expected`: the counts per
-    second that earlier checks foretell, `u_expected` the standard uncertainty of the difference.
-    `jumped`: the lamp is not what it was, so its level is counted from this check on.
+    `before_step`: the first step of the plan after it. `expected`: counts per second that earlier
+    checks predict; `u_expected`: standard uncertainty of the difference from it. `jumped`: the
+    lamp's level has changed, so its drift is followed anew from this check on.
     """
 
     before_step: int
@@ -68,7 +69,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Preview:
-    """A small picture for the report with the window's outline, (N, 2) as (column, row)."""
+    """PNG picture for the report and the window's outline, (N, 2) pixels as (column, row)."""
 
     step: int
     caption: str

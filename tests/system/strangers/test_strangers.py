@@ -122,9 +122,9 @@ def test_a_protocol_can_name_no_device_or_pipe_as_its_rig(rig: str, tmp_path: Pa
     os.mknod(tmp_path / "socket", 0o140600)
     (tmp_path / "link").symlink_to("/dev/zero")
     said = refusal(tmp_path, "rig: rig.yaml", f"rig: {rig}")
-    assert "cannot be read: it is no file but a device, a pipe or a socket" in said
+    assert "cannot be read: it is a device, a pipe or a socket, not a file" in said
     os.mkfifo(tmp_path / "p2.yaml")
-    with pytest.raises(InputError, match="it is no file but a device"):
+    with pytest.raises(InputError, match="it is a device"):
         load_protocol(tmp_path / "p2.yaml")
 
 
