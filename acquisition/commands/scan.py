@@ -10,10 +10,11 @@ from pathlib import Path
 
 from acquisition.commands.scan_session import scan
 from acquisition.commands.views import print_outcome, print_plan
-from acquisition.engine.frame_files import require_room
+from acquisition.engine.frame_files import require_disk_space
 from acquisition.engine.resume import Progress
-from acquisition.plan.moves import home_pose, moves_between
+from acquisition.plan.moves import moves_between
 from acquisition.plan.plan import Plan, make_plan
+from acquisition.plan.pose import home_pose
 from acquisition.results.model_check import check_model
 from acquisition.results.run_folder import (
     default_folder,
@@ -40,7 +41,7 @@ def run_protocol(
     plan = make_plan(loaded)
     prepare(loaded)
     folder = out if out is not None else default_folder(loaded)
-    require_room(plan, loaded, folder)
+    require_disk_space(plan, loaded, folder)
     with Record.create(folder, run_meta(loaded, plan)) as record, record.claimed():
         write_run_inputs(record)
         scan(loaded, plan, record)
@@ -56,15 +57,15 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
         write_run_inputs(record)
         loaded = load_run_inputs(record)
         plan = make_plan(loaded)
-        so_far = Progress(tuple(record.readings()), tuple(record.checks()))
-        missing = so_far.missing(plan)
+        progress = Progress.of(record)
+        missing = progress.missing(plan)
         if missing:
             # Raises, before anything moves, where no way leads to the first missing pose.
             moves_between(home_pose(loaded.rig), missing[0].pose, loaded.rig)
             prepare(loaded)
             with record.claimed():
                 _confirm(yes, len(missing), record)
-                scan(loaded, plan, record, so_far)
+                scan(loaded, plan, record, progress)
         _finish(record, loaded, as_json)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import closing
 
 from acquisition.engine.engine import Devices, Engine
-from acquisition.engine.event_log import EventLogHandler, noted
+from acquisition.engine.event_log import EventLogHandler, log_to_record
 from acquisition.engine.resume import Progress
 from acquisition.plan.plan import Plan, Step
 from acquisition.rig import open_devices
@@ -17,17 +17,17 @@ from instrument.errors import DeviceError, OperatorStop, StorageError
 from instrument.record.record import Record
 
 
-def scan(loaded: Loaded, plan: Plan, record: Record, so_far: Progress | None = None) -> None:
+def scan(loaded: Loaded, plan: Plan, record: Record, progress: Progress | None = None) -> None:
     """Run the plan, or what is missing of it; the caller has claimed the run.
 
     Raises `OperatorStop`, `DeviceError` or `StorageError` with the command that goes on.
     """
     clock: Clock = SystemClock()
-    with noted(record) as notes:
+    with log_to_record(record) as notes:
         try:
             with closing(open_devices(loaded)) as devices:
                 clock = devices.clock
-                _drive(loaded, plan, record, so_far, devices, notes)
+                _drive(loaded, plan, record, progress, devices, notes)
         except (KeyboardInterrupt, OperatorStop) as stop:
             why = str(stop) or "stopped by the operator"
             _write_down(record, notes, clock, "stopped", why)
@@ -45,11 +45,11 @@ def _drive(
     loaded: Loaded,
     plan: Plan,
     record: Record,
-    so_far: Progress | None,
+    progress: Progress | None,
     devices: Devices,
     notes: EventLogHandler,
 ) -> None:
-    clock, before = devices.clock, so_far or Progress()
+    clock, before = devices.clock, progress or Progress()
     begun_s = clock.now_s() - before.elapsed_s
     console.print(
         f"{loaded.protocol.name}: {len(plan.points)} geometries, about "
@@ -59,7 +59,7 @@ def _drive(
     )
     with progress_bar(plan, before.done) as show:
         told = _both(show, notes)
-        Engine(loaded.protocol, loaded.rig, devices, record, told).run(plan, so_far)
+        Engine(loaded.protocol, loaded.rig, devices, record, told).run(plan, progress)
     notes.write()
     record.add_event(clock.utc().isoformat(), "finished", f"{len(plan.steps)} steps")
     record.set_meta("scan_s", f"{clock.now_s() - begun_s:.1f}")

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
-from acquisition.engine.frame_files import kept_bytes
-from acquisition.plan.plan import Plan, lamp_settings
+from acquisition.engine.frame_files import frame_bytes
+from acquisition.plan.plan import Plan
 from acquisition.terminal.console import duration_text, out
 from instrument.config.load import Loaded
 
@@ -27,10 +27,12 @@ def print_plan(loaded: Loaded, plan: Plan) -> None:
     views_deg: dict[int, list[float]] = {}
     for step in plan.points:
         views_deg.setdefault(step.lamp_setting, []).append(step.pose.theta_r)
-    for number, theta_i, dphi in lamp_settings(plan):
+    positions = {step.lamp_setting: step.pose for step in plan.steps}
+    for number, pose in sorted(positions.items()):
         own = views_deg.get(number, [])
         span = f"{min(own):g} … {max(own):g}" if own else ""
-        lamp.add_row(str(number + 1), f"{theta_i:g}", f"{dphi:g}", str(len(own)), span)
+        angles = (f"{pose.theta_i:g}", f"{pose.dphi:g}")
+        lamp.add_row(str(number + 1), *angles, str(len(own)), span)
     out.print(lamp)
 
 
@@ -53,7 +55,7 @@ def _plan_rows(loaded: Loaded, plan: Plan) -> Iterator[tuple[str, str]]:
         + (", covers it once" if plan.darks_first_s else ""),
     )
     if loaded.protocol.keep_frames:
-        yield "frames", f"all kept, {kept_bytes(plan, loaded) / 1e6:.0f} MB"
+        yield "frames", f"all kept, {frame_bytes(plan, loaded) / 1e6:.0f} MB"
     yield "duration", f"about {duration_text(plan.duration_s)}"
 
 

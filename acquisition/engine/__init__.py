@@ -1,1 +1,1 @@
-"""acquisition/engine."""
+"""Scan engine: runs a plan on the devices and records the readings; start with `engine`."""

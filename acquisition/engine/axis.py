@@ -1,4 +1,4 @@
-"""One axis of the rig: a stage behind the rig file's zero, sign and limits."""
+"""Axis of the rig: a stage with the rig file's zero, sign, limits and tolerance applied."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from instrument.errors import DeviceError
 
 
 class Axis:
-    """Moves a stage in the rig's degrees; refuses what the rig file does not allow."""
+    """Moves a stage in the rig's degrees and enforces the limits of the rig file."""
 
     def __init__(
         self, name: str, stage: Stage, settings: HandAxis | MotorAxis, clock: Clock
@@ -19,11 +19,11 @@ class Axis:
 
     @property
     def by_hand(self) -> bool:
-        """Whether the operator moves this axis."""
+        """True if the operator sets this axis."""
         return isinstance(self._settings, HandAxis)
 
     def identity(self) -> str:
-        """Who answers."""
+        """Return maker, model and serial number of the stage."""
         return self._stage.identity()
 
     def home(self) -> None:
@@ -31,22 +31,22 @@ class Axis:
         self._stage.home()
 
     def homed(self) -> bool:
-        """Whether it still knows its reference, asked once it has come to rest."""
+        """Return True if the stage, at rest, still has its reference."""
         return self._stage.homed()
 
     def settings(self) -> dict[str, str]:
-        """What the stage says that it is set to, with the rig file's zero and sign."""
+        """Return the stage's settings, with the rig file's zero and sign."""
         own = self._settings
         if isinstance(own, HandAxis):
             return self._stage.settings()
         return {"zero_deg": f"{own.zero_deg:g}", "sign": str(own.sign), **self._stage.settings()}
 
     def position_deg(self) -> float:
-        """Where the axis is."""
+        """Return the current angle."""
         return self._settings.from_device_deg(self._stage.position_deg())
 
     def start_move(self, angle_deg: float) -> None:
-        """Begin to move; past a limit of the rig file nothing is sent to the device."""
+        """Start a move; raise `DeviceError`, with nothing sent, outside the rig file's limits."""
         low, high = self._settings.min_deg, self._settings.max_deg
         if not low - 1e-9 <= angle_deg <= high + 1e-9:
             raise DeviceError(
@@ -57,12 +57,14 @@ class Axis:
         self._stage.start_move(self._settings.to_device_deg(angle_deg))
 
     def finish_move(self) -> None:
-        """Wait for the end of the move and check where the axis stands."""
+        """Wait for the end of the move; raise `DeviceError` if the axis missed its target."""
         reached = self._settings.from_device_deg(self._stage.wait())
-        self._require(reached, self._target_deg, "", "look for what holds the stage, then go on")
+        self._require(
+            reached, self._target_deg, "", "look for what blocks the stage, then resume the scan"
+        )
 
     def require_at(self, angle_deg: float) -> None:
-        """Raise `DeviceError` where the axis, once at rest there, no longer stands at an angle."""
+        """Raise `DeviceError` if the axis has left an angle while frames were taken."""
         after = "after the frames were taken, which do not count, "
         self._require(self.position_deg(), angle_deg, after, "look for what has moved the stage")
 
@@ -75,14 +77,14 @@ class Axis:
             )
 
     def settle(self) -> None:
-        """Let the axis come to rest."""
+        """Wait for the settling time of a motor."""
         if not isinstance(self._settings, HandAxis):
             self._clock.sleep(self._settings.settle_s)
 
     def stop(self) -> None:
-        """End all motion now."""
+        """Stop all motion immediately."""
         self._stage.stop()
 
     def close(self) -> None:
-        """Let go of the device."""
+        """Release the device."""
         self._stage.close()

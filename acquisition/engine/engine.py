@@ -1,8 +1,8 @@
-"""The engine: move, settle, expose; while the stage moves on, reduce and write down.
+"""Engine of a scan: move, settle, expose; reduce and record while the next move is under way.
 
-Knows devices only by their interfaces. Every reading is on disk before the next move counts as
-done. Whatever ends a scan, the motion is stopped and the lamp darkened, and nothing moves again in
-this process: to go on is the operator's word.
+Devices are known only by their interfaces. Every reading is on disk before the next move counts as
+done. However a scan ends, motion is stopped and the lamp darkened, and this process moves nothing
+again: only the operator may resume the scan.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from dataclasses import asdict, dataclass, replace
 
 from acquisition.engine.axis import Axis
 from acquisition.engine.exposer import Exposed, Exposer
-from acquisition.engine.frame_files import keep
+from acquisition.engine.frame_files import write_frames
 from acquisition.engine.positioner import Positioner
-from acquisition.engine.preview import preview_of
-from acquisition.engine.resume import Progress, describe
+from acquisition.engine.preview import make_preview
+from acquisition.engine.resume import Progress, check_text
 from acquisition.engine.retrying_camera import RetryingCamera
 from acquisition.measure.radiometry import Signal, measure
 from acquisition.measure.window import Window, window_at
@@ -27,16 +27,17 @@ from instrument.config.rig import Rig
 from instrument.devices import Camera, Lamp, Operator, Surface
 from instrument.errors import DeviceError
 from instrument.pinhole import Pinhole
+from instrument.record.event_kinds import DRIFT, OPERATOR
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 
 
 @dataclass(frozen=True, slots=True)
 class Devices:
-    """What the engine drives.
+    """Devices that the engine drives.
 
-    `begin_step` tells a simulated scene which step comes next, and at which time of the plan it is
-    read. `close` lets go of them all.
+    `begin_step` passes a step's index and planned time to a simulated scene. `close` releases all
+    devices.
     """
 
     axes: dict[str, Axis]
@@ -49,7 +50,7 @@ class Devices:
 
 
 class Engine:
-    """Runs the steps of a plan; `on_step` is told of each step once it is on disk."""
+    """Runs the steps of a plan; `on_step` is called with each step once it is on disk."""
 
     def __init__(
         self,
@@ -63,14 +64,16 @@ class Engine:
         self._record, self._on_step = record, on_step
         self._pinhole = Pinhole.of(rig)
         self._ended = False
-        self._hands = Positioner(rig, devices.axes, devices.lamp, devices.operator, self._answered)
+        self._positioner = Positioner(
+            rig, devices.axes, devices.lamp, devices.operator, self._note_operator
+        )
         camera = RetryingCamera(devices.camera)
         self._exposer = Exposer(camera, devices.lamp, devices.clock, protocol, rig, record)
 
-    def run(self, plan: Plan, so_far: Progress | None = None) -> None:
-        """Run all steps, or those that are missing `so_far` of a scan that was stopped.
+    def run(self, plan: Plan, progress: Progress | None = None) -> None:
+        """Run all steps, or resume a stopped scan with the steps missing from its progress.
 
-        Leaves a safe rig behind, whatever happens, and refuses (`DeviceError`) to run again.
+        Leaves a safe rig behind in every case, and refuses (`DeviceError`) to run again.
         """
         if self._ended:
             raise DeviceError(
@@ -78,27 +81,27 @@ class Engine:
                 "operator has said so: gonio resume"
             )
         try:
-            self._introduce_all()
-            if so_far is None:
+            self._register_devices()
+            if progress is None:
                 self._begin(plan)
-                self._scan(plan.steps)
+                self._scan(plan, plan.steps)
             else:
-                self._go_on(plan, so_far)
-                self._scan(so_far.missing(plan))
+                self._resume(plan, progress)
+                self._scan(plan, progress.missing(plan))
         finally:
             self._ended = True
-            self._hands.make_safe()
+            self._positioner.make_safe()
 
-    def _introduce_all(self) -> None:
+    def _register_devices(self) -> None:
         devices = self._devices
         named: dict[str, Camera | Axis] = {"camera": devices.camera, **devices.axes}
         for role, device in named.items():
-            self._introduce(role, device.identity())
+            self._register(role, device.identity())
             self._record.add_settings(devices.clock.utc().isoformat(), role, device.settings())
-        self._introduce("lamp", devices.lamp.identity())
+        self._register("lamp", devices.lamp.identity())
 
-    def _introduce(self, role: str, identity: str) -> None:
-        """Write down who answers; on going on with a scan it must be who answered before."""
+    def _register(self, role: str, identity: str) -> None:
+        """Record a device's identity; a resumed scan requires the one of its beginning."""
         before = self._record.devices().get(role)
         if before not in (None, identity):
             raise DeviceError(
@@ -108,79 +111,78 @@ class Engine:
         self._record.add_device(role, identity)
 
     def _begin(self, plan: Plan) -> None:
-        """Home, take the darks that need a hand."""
-        self._hands.home()
+        """Home the axes and take the darks for which the operator covers the lamp."""
+        self._positioner.home()
         self._open_shutter()
-        self._exposer.start(0.0)
+        self._exposer.start_clock(0.0)
         self._exposer.take_darks(plan.darks_first_s)
 
-    def _go_on(self, plan: Plan, so_far: Progress) -> None:
-        """Bring the rig where the scan stood, look whether the lamp is what it was."""
-        first = so_far.missing(plan)[0]
-        self._hands.find()
+    def _resume(self, plan: Plan, progress: Progress) -> None:
+        """Restore the state in which the scan stopped, and check the lamp for drift."""
+        first = progress.missing(plan)[0]
+        self._positioner.recover_position()
         self._open_shutter()
-        self._exposer.know(so_far.readings)
+        self._exposer.restore(progress.readings)
         self._exposer.take_darks(plan.darks_first_s)
-        self._check_drift(plan, so_far, first)
-        stood = so_far.where_it_stood(plan, first)
-        if stood is not None:
-            self._return_to(stood, first.surface)
-        self._exposer.start(so_far.elapsed_s)
+        self._check_drift(plan, progress, first)
+        last = progress.last_step(plan, first.block)
+        if last is not None:
+            self._return_to(last, first.surface)
+        self._exposer.start_clock(progress.elapsed_s)
 
     def _open_shutter(self) -> None:
-        """However the lamp was left."""
         if self._rig.lamp.darkened_by == "shutter":
             self._devices.lamp.light()
 
-    def _check_drift(self, plan: Plan, so_far: Progress, first: Step) -> None:
-        """Measure the drift reference again, if the scan has one to compare with."""
-        repeated = so_far.drift_step(plan, first.block)
-        if repeated is None:
+    def _check_drift(self, plan: Plan, progress: Progress, first: Step) -> None:
+        """Repeat the last drift check, if the block of the next step has one."""
+        original = progress.drift_step(plan, first.block)
+        if original is None:
             return
-        # A number of its own, so that a simulated scene gives it noise of its own.
-        own = replace(repeated, index=len(plan.steps) + len(so_far.checks), preview=False)
-        self._devices.begin_step(own.index, first.start_s)
-        self._place(own.surface)
-        self._hands.go(own.pose)
-        reading = replace(
-            self._reduced(self._exposed(own)),
-            step=repeated.index, time_s=so_far.elapsed_s, free_s=so_far.elapsed_s,
-        )  # fmt: skip
-        check = so_far.check(reading, first)
+        # An index of its own, so that a simulated scene draws new noise.
+        step = replace(original, index=len(plan.steps) + len(progress.checks), preview=False)
+        self._devices.begin_step(step.index, first.start_s)
+        self._place(step.surface)
+        self._positioner.move_to(step.pose)
+        elapsed_s = progress.elapsed_s
+        reading = self._measure(self._expose(step))
+        reading = replace(reading, step=original.index, time_s=elapsed_s, free_s=elapsed_s)
+        check = progress.check_drift(reading, first)
         self._record.add_check(check)
-        self._event("drift", describe(check))
+        self._add_event(DRIFT, check_text(check))
 
-    def _return_to(self, stood: Step, next_surface: Surface) -> None:
-        """Stand as after the last accepted step: then the next is come to as it would have been."""
-        if stood.surface == next_surface:
+    def _return_to(self, last: Step, next_surface: Surface) -> None:
+        """Return to the last accepted pose: the next move then has an unbroken scan's backlash."""
+        if last.surface == next_surface:
             self._place(next_surface)
         try:
-            self._hands.go(stood.pose)
+            self._positioner.move_to(last.pose)
         except NoPathError:
-            return  # no straight way back; there is one to the next step, from here
+            return  # no path back, but there may be one from here to the next step
 
-    def _scan(self, steps: Sequence[Step]) -> None:
+    def _scan(self, plan: Plan, steps: Sequence[Step]) -> None:
         waiting = None
         for step in steps:
             self._devices.begin_step(step.index, step.start_s + step.duration_s)
-            if step.surface != self._hands.surface:
+            if step.surface != self._positioner.surface:
                 self._accept(waiting)  # the operator may take their time, or give up
                 waiting = None
                 self._place(step.surface)
-            self._hands.set_out(step.pose)
+            moves = plan.moves_to(step, self._positioner.pose, self._rig)
+            self._positioner.start_moves(moves, step.pose)
             self._accept(waiting)
-            self._hands.arrive()
-            waiting = self._exposed(step)
+            self._positioner.finish_moves()
+            waiting = self._expose(step)
         self._accept(waiting)
 
     def _place(self, surface: Surface) -> None:
         name = self._protocol.sample.name if surface == "sample" else "the white tile"
-        self._hands.place(surface, name)
+        self._positioner.place(surface, name)
 
-    def _exposed(self, step: Step) -> Exposed:
-        """The frames of a step, for all of which the axes stood where they were put."""
+    def _expose(self, step: Step) -> Exposed:
+        """Take the frames of a step; raise `DeviceError` if an axis has moved meanwhile."""
         exposed = self._exposer.expose(step, self._window(step))
-        self._hands.require_in_place()
+        self._positioner.require_in_place()
         return exposed
 
     def _window(self, step: Step) -> Window:
@@ -188,20 +190,20 @@ class Engine:
         return window_at(step.pose.theta_r, self._pinhole, patch.width_mm, patch.height_mm)
 
     def _accept(self, exposed: Exposed | None) -> None:
-        """Reduce the frames of a step and commit them."""
+        """Reduce the frames of a step and commit them to the record."""
         if exposed is None:
             return
-        step, reading = exposed.step, self._reduced(exposed)
+        step, reading = exposed.step, self._measure(exposed)
         preview = None
         if step.preview:
-            preview = preview_of(exposed, self._window(step), self._rig.camera.max_dn)
-        kept = self._protocol.keep_frames
-        files = keep(exposed.frames, step.index, self._record.folder) if kept else ()
+            preview = make_preview(exposed, self._window(step), self._rig.camera.max_dn)
+        keep = self._protocol.keep_frames
+        files = write_frames(exposed.frames, step.index, self._record.folder) if keep else ()
         self._record.add_reading(reading, preview, exposed.frames, files)
-        self._exposer.seen(reading)
+        self._exposer.note_brightness(reading)
         self._on_step(step)
 
-    def _reduced(self, exposed: Exposed) -> Reading:
+    def _measure(self, exposed: Exposed) -> Reading:
         window = self._window(exposed.step)
         signal = measure(
             exposed.frames,
@@ -213,15 +215,15 @@ class Engine:
         )
         return _reading(exposed, window, signal)
 
-    def _answered(self, text: str) -> None:
-        self._event("operator", text)
+    def _note_operator(self, text: str) -> None:
+        self._add_event(OPERATOR, text)
 
-    def _event(self, kind: str, text: str) -> None:
+    def _add_event(self, kind: str, text: str) -> None:
         self._record.add_event(self._devices.clock.utc().isoformat(), kind, text)
 
 
 def _reading(exposed: Exposed, window: Window, signal: Signal) -> Reading:
-    """The row of the record."""
+    """Return the row of the record."""
     step, first = exposed.step, exposed.frames[0]
     return Reading(
         step=step.index,

@@ -1,7 +1,7 @@
-"""What drivers say while they work (a question asked again, a frame refused) goes into the record.
+"""Log messages of drivers and engine (retries, refused frames) as events of the record.
 
-Drivers only log. They do so from several threads, the record belongs to one: messages wait in a
-queue until that one writes them down.
+Drivers log from several threads, the record belongs to one: messages wait in a queue until that
+thread writes them.
 """
 
 from __future__ import annotations
@@ -15,48 +15,48 @@ from queue import Empty, SimpleQueue
 from instrument.record.event_kinds import RETRY, TROUBLE
 from instrument.record.record import Record
 
-SPEAKERS = ("drivers", "acquisition", "sim")
+LOGGERS = ("drivers", "acquisition", "sim")
 
 
 class EventLogHandler(logging.Handler):
-    """Keeps what is logged until `write` puts it into the record: its level says what it is.
+    """Queues messages until `write` records them: warnings as retries, errors as troubles.
 
-    `troubles`: what a person has to be told as well.
+    `troubles`: the messages that have to be shown to a person as well.
     """
 
     def __init__(self, record: Record) -> None:
         super().__init__(logging.WARNING)
         self._record = record
         self.troubles: list[str] = []
-        self._waiting: SimpleQueue[logging.LogRecord] = SimpleQueue()
+        self._queue: SimpleQueue[logging.LogRecord] = SimpleQueue()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Take a message from any thread."""
+        """Queue a message, from any thread."""
         if record.levelno >= logging.ERROR:
             self.troubles.append(record.getMessage())
-        self._waiting.put(record)
+        self._queue.put(record)
 
     def write(self) -> None:
-        """Write down what has come, in order; raises `StorageError`."""
+        """Write the queued messages to the record, in order; raise `StorageError`."""
         while True:
             try:
-                said = self._waiting.get_nowait()
+                message = self._queue.get_nowait()
             except Empty:
                 return
-            time_utc = datetime.fromtimestamp(said.created, UTC).isoformat()
-            kind = RETRY if said.levelno < logging.ERROR else TROUBLE
-            self._record.add_event(time_utc, kind, said.getMessage())
+            time_utc = datetime.fromtimestamp(message.created, UTC).isoformat()
+            kind = RETRY if message.levelno < logging.ERROR else TROUBLE
+            self._record.add_event(time_utc, kind, message.getMessage())
 
 
 @contextmanager
-def noted(record: Record) -> Iterator[EventLogHandler]:
-    """Listen to all drivers for a while."""
+def log_to_record(record: Record) -> Iterator[EventLogHandler]:
+    """Collect log messages for the record within a `with` block; yield the handler."""
     handler = EventLogHandler(record)
-    speakers = [logging.getLogger(name) for name in SPEAKERS]
-    for speaker in speakers:
-        speaker.addHandler(handler)
+    loggers = [logging.getLogger(name) for name in LOGGERS]
+    for logger in loggers:
+        logger.addHandler(handler)
     try:
         yield handler
     finally:
-        for speaker in speakers:
-            speaker.removeHandler(handler)
+        for logger in loggers:
+            logger.removeHandler(handler)

@@ -1,4 +1,4 @@
-"""The frames that a protocol asks to keep: one file each, written whole before the row names it."""
+"""TIFF files of all frames, for protocols with `keep_frames`: written before their reading."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from instrument.text.atomic_file import explain_os_error, make_folder, write_who
 FOLDER = "frames"
 
 
-def keep(frames: Sequence[Frame], step: int, run: Path) -> tuple[str, ...]:
-    """Write raw counts as TIFF under the run's folder; returns the names relative to it.
+def write_frames(frames: Sequence[Frame], step: int, run: Path) -> tuple[str, ...]:
+    """Write raw counts as TIFF into the run's folder; return the names relative to it.
 
-    Raises `StorageError` where the disk does not take them.
+    Raises `StorageError` if a file cannot be written.
     """
     import cv2
 
@@ -32,8 +32,8 @@ def keep(frames: Sequence[Frame], step: int, run: Path) -> tuple[str, ...]:
     return names
 
 
-def kept_bytes(plan: Plan, loaded: Loaded) -> int:
-    """What the kept frames of a whole scan need on disk; 0 where none are kept."""
+def frame_bytes(plan: Plan, loaded: Loaded) -> int:
+    """Return the disk space for the frames of a whole scan; 0 if none are kept."""
     camera = loaded.rig.camera
     if not loaded.protocol.keep_frames:
         return 0
@@ -41,13 +41,13 @@ def kept_bytes(plan: Plan, loaded: Loaded) -> int:
     return frame * sum(step.frames for step in plan.steps)
 
 
-def require_room(plan: Plan, loaded: Loaded, folder: Path) -> None:
-    """Raise `InputError` where the frames to be kept do not fit on the run's disk."""
-    needed = kept_bytes(plan, loaded)
-    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
-    free = shutil.disk_usage(there).free
+def require_disk_space(plan: Plan, loaded: Loaded, folder: Path) -> None:
+    """Raise `InputError` if the frames to be kept do not fit on the run's disk."""
+    needed = frame_bytes(plan, loaded)
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    free = shutil.disk_usage(existing).free
     if needed > free:
         raise InputError(
             f"{loaded.protocol_path}: keep_frames: the frames need {needed / 1e9:.2f} GB, and "
-            f"{there} has {free / 1e9:.2f} GB free: name another disk with --out, or keep none"
+            f"{existing} has {free / 1e9:.2f} GB free: name another disk with --out, or keep none"
         )

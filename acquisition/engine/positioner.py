@@ -1,4 +1,4 @@
-"""Where things stand: the axes by their moves, the surface on the table; only this moves them."""
+"""Positioning: moves the axes along a checked path, and has the operator swap the surface."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import math
 from collections.abc import Callable, Mapping
 
 from acquisition.engine.axis import Axis
-from acquisition.plan.moves import Move, Pose, home_pose, moves_between
+from acquisition.plan.moves import Move, moves_between
+from acquisition.plan.pose import Pose, home_pose
 from instrument.config.axes import AXES
 from instrument.config.rig import Rig
 from instrument.devices import Lamp, Operator, Request, Surface
@@ -17,9 +18,9 @@ log = logging.getLogger(__name__)
 
 
 class Positioner:
-    """Moves the axes clear of all keep-out zones, and has the operator change the surface.
+    """Keeps track of pose and surface, and is the only one to change them.
 
-    `note` writes down what the operator answered.
+    `note` records the operator's answers.
     """
 
     def __init__(
@@ -39,12 +40,12 @@ class Positioner:
         self._started = False
 
     def home(self) -> None:
-        """Have every axis find its reference."""
+        """Home every axis."""
         for axis in self._axes.values():
             axis.home()
 
-    def find(self) -> None:
-        """After an interruption: end what still moves, home what has lost its reference."""
+    def recover_position(self) -> None:
+        """Determine the pose after an interruption: stop all axes, home those that need it."""
         for axis in self._axes.values():
             axis.stop()
         angles = {}
@@ -59,21 +60,21 @@ class Positioner:
                 angles[name] = getattr(home, name)
         self.pose = Pose(**angles)
 
-    def go(self, pose: Pose) -> None:
-        """Move there and come to rest; raises `NoPathError` before anything moves."""
-        self.set_out(pose)
-        self.arrive()
+    def move_to(self, pose: Pose) -> None:
+        """Move to a pose and come to rest; raise `NoPathError`, before moving, without a path."""
+        self.start_moves(moves_between(self.pose, pose, self._rig), pose)
+        self.finish_moves()
 
-    def set_out(self, pose: Pose) -> None:
-        """Set the first motor going, so that something else can be done while it moves."""
-        self._moves, self._target = moves_between(self.pose, pose, self._rig), pose
-        first = self._moves[0] if self._moves else None
+    def start_moves(self, moves: tuple[Move, ...], target: Pose) -> None:
+        """Start the first of the moves to a pose, if it is a motor's, and return."""
+        self._moves, self._target = moves, target
+        first = moves[0] if moves else None
         self._started = first is not None and not self._axes[first.axis].by_hand
         if first is not None and self._started:
             self._axes[first.axis].start_move(first.angle_deg)
 
-    def arrive(self) -> None:
-        """Make the moves one after the other, then let the axes come to rest."""
+    def finish_moves(self) -> None:
+        """Make the moves one after the other, then let the axes settle."""
         for number, move in enumerate(self._moves):
             axis = self._axes[move.axis]
             if number > 0 or not self._started:
@@ -86,10 +87,7 @@ class Positioner:
         self.pose, self._moves = self._target, ()
 
     def require_in_place(self) -> None:
-        """Raise `DeviceError` where a motor no longer stands where it was put.
-
-        Whatever was seen meanwhile belongs to no angle.
-        """
+        """Raise `DeviceError` if a motor has left the pose: frames taken since are invalid."""
         for name, axis in self._axes.items():
             if not axis.by_hand:
                 axis.require_at(getattr(self.pose, name))
@@ -104,24 +102,24 @@ class Positioner:
         self.surface = surface
 
     def make_safe(self) -> None:
-        """Stop every axis and shut the lamp off, even when one of them fails to answer.
+        """Stop every axis and close the shutter, even if some of them fail.
 
-        A Ctrl-C meanwhile asks for what is being done: it is done to the end, and noted.
+        An action interrupted by a Ctrl-C is repeated, and the interruption is logged.
         """
-        safe: list[tuple[str, Callable[[], None]]] = [
+        actions: list[tuple[str, Callable[[], None]]] = [
             (name, self._axes[name].stop) for name in AXES if name in self._axes
         ]
         if self._rig.lamp.darkened_by == "shutter":
-            safe.append(("lamp", self._lamp.darken))
-        for name, action in safe:
+            actions.append(("lamp", self._lamp.darken))
+        for name, action in actions:
             try:
-                _made_safe(name, action)
+                _attempt(name, action)
             except KeyboardInterrupt:
-                log.error("%s: Ctrl-C while it was made safe: made safe once more", name)
-                _made_safe(name, action)  # the stop may not have gone out
+                log.error("%s: Ctrl-C while the rig was made safe: action repeated", name)
+                _attempt(name, action)  # the stop may not have been sent
 
 
-def _made_safe(name: str, action: Callable[[], None]) -> None:
+def _attempt(name: str, action: Callable[[], None]) -> None:
     try:
         action()
     except (DeviceError, OSError) as error:

@@ -1,4 +1,4 @@
-"""A camera that is lost for a while: asked again, within bounds, before the scan is given up."""
+"""Camera that retries when the connection is lost, a bounded number of times."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from instrument.errors import CameraLost
 
 log = logging.getLogger(__name__)
 
-TRIES = 4  # the camera's own driver looks for it for two seconds at each
+MAX_TRIES = 4  # in each of them the camera's driver tries to reconnect for two seconds
 
 T = TypeVar("T")
 
 
 class RetryingCamera:
-    """Asks up to `TRIES` times a call; each further try is logged, and so in the record.
+    """Repeats a call up to `MAX_TRIES` times; each retry is logged, and so enters the record.
 
-    A camera that comes back has been set as before by its driver, or it raises another error. A
-    call is made again whole: its frames are all of one opening.
+    The driver restores the settings of a camera that reconnects, or raises another error. A call
+    is repeated as a whole: all its frames are from one connection.
     """
 
     def __init__(self, camera: Camera) -> None:
@@ -28,16 +28,16 @@ class RetryingCamera:
 
     def set_exposure_s(self, exposure_s: float) -> float:
         """Set the exposure and return the one read back, in seconds."""
-        return self._patiently(lambda: self._camera.set_exposure_s(exposure_s))
+        return self._retry(lambda: self._camera.set_exposure_s(exposure_s))
 
     def grab(self, count: int) -> list[Frame]:
         """Take `count` frames whose exposure began after this call."""
-        return self._patiently(lambda: self._camera.grab(count))
+        return self._retry(lambda: self._camera.grab(count))
 
-    def _patiently(self, action: Callable[[], T]) -> T:
-        for tried in range(1, TRIES):
+    def _retry(self, action: Callable[[], T]) -> T:
+        for tried in range(1, MAX_TRIES):
             try:
                 return action()
             except CameraLost as error:
-                log.warning("%s: try %d of %d", error, tried + 1, TRIES)
+                log.warning("%s: try %d of %d", error, tried + 1, MAX_TRIES)
         return action()

@@ -1,1 +1,1 @@
-"""acquisition/measure."""
+"""Measuring: frames to a window mean with its uncertainty, and lamp drift; start with `window`."""

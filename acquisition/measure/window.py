@@ -1,9 +1,9 @@
-"""The measuring window: always the same patch of the sample, whatever the view angle.
+"""Measuring window: pixel weights that average the same patch of the sample at every view angle.
 
-The patch is projected into the picture; every pixel counts by the area of the patch that it sees
-(its coverage by the window's outline times the sample's area per pixel), so that the mean is one
-over the patch's area and not over pixels: perspective would favour the near side. Each weight is
-divided by cos^4 (1991, equation 81). Oren and Nayar 1995, section 5: "the image window size is
+The patch is projected into the image. Each pixel is weighted by the area of the patch that it
+covers (its overlap with the window's outline times the sample area per pixel): the mean is over
+the patch's area and not over pixels, which perspective would bias to the near side. Each weight
+is divided by cos^4 (1991, equation 81). Oren and Nayar 1995, section 5: "the image window size is
 varied as a function of sensor direction to ensure that the same area on the sample is always
 used".
 """
@@ -20,15 +20,14 @@ from instrument.pinhole import Pinhole, apply_homography, area_per_pixel_mm2, re
 from instrument.pixel_coverage import polygon_coverage
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """Weights of the pixels of one view angle.
+    """Pixel weights of one view angle.
 
-    `weights` (rows, columns) over `crop`; their sum is 1 but for the division by cos^4.
-    `counted`: pixels of the crop with a weight. `outline_px` (4, 2) as (column, row); `pixels`
-    is the number of whole pixels' worth.
-    `shift_px_per_mm` (columns, rows): how far the surface's picture moves for every mm that it
-    stands nearer to the camera.
+    `weights` (rows, columns) over `crop`, dimensionless; before the division by cos^4 they sum
+    to 1. `counted` (rows, columns): True where the weight is positive. `outline_px` (4, 2) as
+    (column, row). `pixels`: area of the window in pixels. `shift_px_per_mm` (columns, rows): shift
+    of the image for each mm that the surface is closer to the camera.
     """
 
     crop: tuple[slice, slice]
@@ -40,13 +39,13 @@ class Window:
     shift_px_per_mm: tuple[float, float]
 
     def mean(self, image: FloatArray) -> float:
-        """Area-weighted mean of a picture's crop; nan where the window sees no pixel."""
+        """Return the weighted mean of an image crop (rows, columns) in its unit; nan if empty."""
         return float(np.vdot(self.weights, image)) if self.pixels > 0 else float("nan")
 
 
 @lru_cache(maxsize=512)
 def window_at(theta_r_deg: float, pinhole: Pinhole, width_mm: float, height_mm: float) -> Window:
-    """The window of a patch width_mm x height_mm about the axis, seen from theta_r (signed)."""
+    """Return the window of a patch centred on the axis, seen from theta_r (signed)."""
     homography = pinhole.homography(theta_r_deg)
     outline = apply_homography(homography, rectangle_mm(width_mm, height_mm))
     coverage = polygon_coverage(outline, pinhole.width_px, pinhole.height_px)
@@ -57,11 +56,11 @@ def window_at(theta_r_deg: float, pinhole: Pinhole, width_mm: float, height_mm: 
     axis = [0.0, 0.0]
     shift = pinhole.project(axis, theta_r_deg, 1.0) - pinhole.project(axis, theta_r_deg)
     return Window(
-        coverage.crop,
-        weights,
-        weights > 0,
-        outline,
-        float(coverage.fraction.sum()),
-        coverage.inside_frame,
-        (float(shift[0]), float(shift[1])),
+        crop=coverage.crop,
+        weights=weights,
+        counted=weights > 0,
+        outline_px=outline,
+        pixels=float(coverage.fraction.sum()),
+        inside_frame=coverage.inside_frame,
+        shift_px_per_mm=(float(shift[0]), float(shift[1])),
     )

@@ -1,1 +1,1 @@
-"""acquisition/plan."""
+"""Planning a scan before anything moves: steps, moves, exposures; start with `plan`."""

@@ -1,8 +1,8 @@
-"""The plan of a scan: every step, whole and checked, before anything moves.
+"""Plan of a scan: every step, checked as a whole before anything moves.
 
-Protocol and rig in, arrays of steps out; no device is known here. Hand-set axes vary slowest, so
-that the operator is asked as seldom as can be; every inner axis runs to and fro (serpentine).
-Where camera and lamp hide one another nothing is measured, and the geometries are counted.
+Protocol and rig in, steps out; devices are unknown here. Hand-set axes vary slowest, so that the
+operator is asked as rarely as possible; every inner axis alternates its direction (serpentine).
+Geometries in which camera and lamp hide one another are left out and counted.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from acquisition.plan.exposure_ladder import expected_exposure_s, exposure_ladder_s
-from acquisition.plan.moves import Move, NoPathError, Pose, home_pose, moves_between
+from acquisition.plan.moves import Move, NoPathError, moves_between
+from acquisition.plan.pose import Pose, home_pose
 from instrument.config.axes import AXES, HandAxis
 from instrument.config.load import Loaded
 from instrument.config.protocol import Protocol, SweepConfig, angles_deg
@@ -19,16 +20,16 @@ from instrument.config.rig import Rig
 from instrument.config.yaml_positions import place
 from instrument.devices import Surface
 from instrument.errors import InputError
-from instrument.geometry import camera_to_lamp_deg, cone_half_angle_deg
+from instrument.geometry import cone_half_angle_deg
 from instrument.record.reading import Kind
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """One measured geometry: which surface, where, how to get there, when.
+    """One geometry to measure: surface, pose, moves to it, planned start and duration.
 
-    `lamp_setting` numbers the places of the lamp (theta_i, dphi), `block` the times that the
-    operator set the lamp by hand; readings are compared with a white tile of the same block.
+    `lamp_setting` numbers the positions of the lamp (theta_i, dphi), `block` its settings by hand;
+    a reading is compared with a white tile of the same block. `preview`: the report shows a frame.
     """
 
     index: int
@@ -45,9 +46,13 @@ class Step:
     preview: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """All steps in order, and what the operator is told beforehand."""
+    """All steps in order, with the totals shown to the operator beforehand.
+
+    `hidden`: poses left out. `darks_first_s`: exposures whose darks are taken before the first
+    step. `swaps`: changes between sample and white tile. `hand_settings`: axes to set by hand.
+    """
 
     steps: tuple[Step, ...]
     hidden: tuple[Pose, ...]
@@ -61,38 +66,47 @@ class Plan:
         """The steps that become rows of measurements.csv."""
         return tuple(step for step in self.steps if step.kind == "point")
 
+    def moves_to(self, step: Step, pose: Pose, rig: Rig) -> tuple[Move, ...]:
+        """Return the moves from `pose` to a step: as planned if `pose` is where the plan starts.
+
+        Raises `NoPathError` if no order of the axes is clear.
+        """
+        start = self.steps[step.index - 1].pose if step.index > 0 else home_pose(rig)
+        return step.moves if pose == start else moves_between(pose, step.pose, rig)
+
 
 def make_plan(loaded: Loaded) -> Plan:
-    """Plan the whole scan; raises `InputError` when a part of it cannot be done."""
+    """Plan the whole scan; raise `InputError` if any part of it is impossible."""
     protocol, rig = loaded.protocol, loaded.rig
     poses = [pose for sweep in protocol.sweeps for pose in sweep_poses(sweep, rig)]
-    limit_deg = hidden_below_deg(rig)
-    hidden = tuple(pose for pose in poses if _separation_deg(pose) < limit_deg)
-    visible = [pose for pose in poses if _separation_deg(pose) >= limit_deg]
+    limit_deg = min_separation_deg(rig)
+    hidden = tuple(pose for pose in poses if pose.separation_deg < limit_deg)
+    visible = [pose for pose in poses if pose.separation_deg >= limit_deg]
     if not visible:
         raise InputError(
-            f"{_place(loaded, 'sweeps')}: camera and lamp hide one another in all {len(poses)} "
+            f"{_position(loaded, 'sweeps')}: camera and lamp hide one another in all {len(poses)} "
             f"geometries; allowed: angles {limit_deg:.2f} deg or more apart"
         )
-    steps = _with_previews(_in_order(visible, protocol, rig))
-    problems = [*_hidden_references(steps, limit_deg, loaded), *_closed_ways(steps, loaded)]
+    steps = _with_previews(_ordered_steps(visible, protocol, rig))
+    steps, blocked = _with_moves(steps, loaded)
+    problems = [*_hidden_references(steps, limit_deg, loaded), *blocked]
     if problems:
         raise InputError(*problems)
-    return _scheduled(steps, hidden, loaded)
+    return _schedule(steps, hidden, loaded)
 
 
-def _place(loaded: Loaded, *path: str) -> str:
+def _position(loaded: Loaded, *path: str) -> str:
     return place(loaded.protocol_path, loaded.protocol_text, path)
 
 
-def hidden_below_deg(rig: Rig) -> float:
-    """Camera and lamp hide one another when their directions are closer than this."""
+def min_separation_deg(rig: Rig) -> float:
+    """Return the angle between camera and lamp below which they hide one another."""
     cones = (rig.source_solid_angle_sr, rig.receiver_solid_angle_sr)
     return max(rig.blocked_half_angle_deg or 0.0, sum(map(cone_half_angle_deg, cones)))
 
 
 def sweep_poses(sweep: SweepConfig, rig: Rig) -> list[Pose]:
-    """All poses of one sweep: slowest axis first as written, hand-set axes before motors."""
+    """Return all poses of one sweep: slowest axis first as written, hand-set axes before motors."""
     names = [key.removesuffix("_deg") for key in sweep]
     names.sort(key=lambda name: not isinstance(rig.axes[name], HandAxis))
     values = {key.removesuffix("_deg"): angles_deg(angles) for key, angles in sweep.items()}
@@ -101,7 +115,7 @@ def sweep_poses(sweep: SweepConfig, rig: Rig) -> list[Pose]:
 
 
 def _serpentine(axes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
-    """The product of the axes, each inner one running to and fro."""
+    """Return the product of the axes, each inner one alternating its direction."""
     if not axes:
         return [()]
     inner = _serpentine(axes[1:])
@@ -112,21 +126,17 @@ def _serpentine(axes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
     ]
 
 
-def _separation_deg(pose: Pose) -> float:
-    return float(camera_to_lamp_deg(pose.theta_i, pose.theta_r, pose.dphi))
+def _ordered_steps(poses: Sequence[Pose], protocol: Protocol, rig: Rig) -> list[Step]:
+    """Return points and references block by block; tile and sample are swapped once a block.
 
-
-def _in_order(poses: Sequence[Pose], protocol: Protocol, rig: Rig) -> list[Step]:
-    """Points with their references, block by block; tile and sample change places once a block.
-
-    A block holds all points, of whichever sweep, that one setting of the lamp by hand serves.
+    A block holds all points, of whichever sweep, that share one setting of the lamp by hand.
     """
-    hands = [n for n in ("theta_i", "dphi") if isinstance(rig.axes[n], HandAxis)]
+    by_hand = [n for n in ("theta_i", "dphi") if isinstance(rig.axes[n], HandAxis)]
     numbers: dict[tuple[int, float, float], int] = {}
     steps: list[Step] = []
     blocks: dict[tuple[float, ...], list[Pose]] = {}
     for pose in poses:
-        blocks.setdefault(tuple(getattr(pose, name) for name in hands), []).append(pose)
+        blocks.setdefault(tuple(getattr(pose, name) for name in by_hand), []).append(pose)
     for block, group in enumerate(blocks.values()):
         sample, tile = _block(group, protocol)
         for kind, pose in [*tile, *sample] if block % 2 == 0 else [*sample, *tile]:
@@ -139,7 +149,7 @@ def _in_order(poses: Sequence[Pose], protocol: Protocol, rig: Rig) -> list[Step]
 def _block(
     poses: list[Pose], protocol: Protocol
 ) -> tuple[list[tuple[Kind, Pose]], list[tuple[Kind, Pose]]]:
-    """The steps on the sample and those on the tile, for one setting of the hand-set axes."""
+    """Return the steps on the sample and those on the tile for one setting by hand."""
     tile, drift = protocol.references.white_tile, protocol.references.drift_check
     sample: list[tuple[Kind, Pose]] = [("point", pose) for pose in poses]
     if drift is not None:
@@ -157,22 +167,23 @@ def _block(
 def _step(
     index: int, kind: Kind, pose: Pose, setting: int, block: int, protocol: Protocol, rig: Rig
 ) -> Step:
-    tile = protocol.references.white_tile
-    on_tile = kind == "tile" and tile is not None
+    tile = protocol.references.white_tile if kind == "tile" else None
     return Step(
-        index,
-        kind,
-        "white tile" if on_tile else "sample",
-        pose,
-        setting,
-        block,
-        tile.frames if on_tile and tile is not None else protocol.frames_per_point,
-        expected_exposure_s(pose.theta_i, 1.0 if on_tile else 0.5, protocol, rig),
+        index=index,
+        kind=kind,
+        surface="sample" if tile is None else "white tile",
+        pose=pose,
+        lamp_setting=setting,
+        block=block,
+        frames=protocol.frames_per_point if tile is None else tile.frames,
+        expected_exposure_s=expected_exposure_s(
+            pose.theta_i, 0.5 if tile is None else 1.0, protocol, rig
+        ),
     )
 
 
 def _with_previews(steps: Sequence[Step]) -> list[Step]:
-    """Mark the steps whose picture the report shows: both ends and the middle of the first arc."""
+    """Mark the steps whose frame the report shows: both ends and the middle of the first arc."""
     first = next(step.lamp_setting for step in steps if step.kind == "point")
     arc = [s for s in steps if s.kind == "point" and s.lamp_setting == first]
     arc.sort(key=lambda step: step.pose.theta_r)
@@ -181,84 +192,78 @@ def _with_previews(steps: Sequence[Step]) -> list[Step]:
     return [replace(step, preview=step.index in chosen) for step in steps]
 
 
+def _with_moves(steps: Sequence[Step], loaded: Loaded) -> tuple[list[Step], list[str]]:
+    """Add the moves to each step; return the steps, and one line for each obstacle met."""
+    obstacles: dict[str, list[str]] = {}
+    start, moved = home_pose(loaded.rig), []
+    for step in steps:
+        try:
+            moved.append(replace(step, moves=moves_between(start, step.pose, loaded.rig)))
+        except NoPathError as error:
+            obstacles.setdefault(error.cause, []).append(error.move)
+            moved.append(step)
+        start = step.pose
+    return moved, [_blocked(loaded, moves) for moves in obstacles.values()]
+
+
+def _blocked(loaded: Loaded, moves: Sequence[str]) -> str:
+    more = f" (and {len(moves) - 1} other moves)" if len(moves) > 1 else ""
+    return f"{_position(loaded, 'sweeps')}: {moves[0]}{more}; see {loaded.rig_path}"
+
+
 def _hidden_references(steps: Sequence[Step], limit_deg: float, loaded: Loaded) -> Iterator[str]:
-    """A reference that the lamp hides cannot be measured."""
-    hidden = [step for step in steps if _separation_deg(step.pose) < limit_deg]
+    """Yield one line for each kind of reference that the lamp hides at some incidence."""
+    hidden = [step for step in steps if step.pose.separation_deg < limit_deg]
     for kind, name in (("tile", "white_tile"), ("drift", "drift_check")):
         lamps = sorted({step.pose.theta_i for step in hidden if step.kind == kind})
         if lamps:
             view = next(step.pose.theta_r for step in hidden if step.kind == kind)
             yield (
-                f"{_place(loaded, 'references', name, 'theta_r_deg')}: {view:g} deg is hidden by "
-                f"the lamp at theta_i {', '.join(f'{angle:g}' for angle in lamps)} deg; allowed: "
-                f"{limit_deg:.2f} deg or more from the lamp"
+                f"{_position(loaded, 'references', name, 'theta_r_deg')}: {view:g} deg is hidden "
+                f"by the lamp at theta_i {', '.join(f'{angle:g}' for angle in lamps)} deg; "
+                f"allowed: {limit_deg:.2f} deg or more from the lamp"
             )
 
 
-def _closed_ways(steps: Sequence[Step], loaded: Loaded) -> Iterator[str]:
-    """Moves that no order of the axes can make, one line for each thing in the way."""
-    closed: dict[str, list[str]] = {}
-    for step, before in zip(steps, (None, *steps), strict=False):
-        try:
-            moves_between(_start(before, loaded.rig), step.pose, loaded.rig)
-        except NoPathError as error:
-            closed.setdefault(error.cause, []).append(error.move)
-    for moves in closed.values():
-        more = f" (and {len(moves) - 1} other moves)" if len(moves) > 1 else ""
-        yield f"{_place(loaded, 'sweeps')}: {moves[0]}{more}; see {loaded.rig_path}"
-
-
-def _start(before: Step | None, rig: Rig) -> Pose:
-    return home_pose(rig) if before is None else before.pose
-
-
-def _scheduled(steps: Sequence[Step], hidden: tuple[Pose, ...], loaded: Loaded) -> Plan:
-    """Add every step's moves and its time."""
+def _schedule(steps: Sequence[Step], hidden: tuple[Pose, ...], loaded: Loaded) -> Plan:
+    """Return the plan, with the start and duration of every step predicted."""
     rig = loaded.rig
     by_hand = rig.lamp.darkened_by == "hand"
-    darks = exposure_ladder_s(rig.camera) if by_hand else ()
-    first_s = _homing_s(rig) + (_darks_s(darks, rig.lamp.cover_s, loaded) if by_hand else 0.0)
-    time_s, seen, done = first_s, set(darks), []
-    for step, before in zip(steps, (None, *steps), strict=False):
-        moves = moves_between(_start(before, rig), step.pose, rig)
-        duration_s = _duration_s(step, before, moves, rig)
-        if step.expected_exposure_s not in seen:
-            seen.add(step.expected_exposure_s)
+    darks_s = exposure_ladder_s(rig.camera) if by_hand else ()
+    time_s = _homing_s(rig) + (_darks_s(darks_s, rig.lamp.cover_s, loaded) if by_hand else 0.0)
+    swaps, taken_s, scheduled = 0, set(darks_s), []
+    surface: Surface | None = None
+    for step in steps:
+        duration_s = sum(move.duration_s for move in step.moves)
+        if step.surface != surface:  # the operator swaps sample and tile, or places the first
+            swaps, surface, duration_s = swaps + 1, step.surface, duration_s + rig.swap_s
+        duration_s += _frames_s(step.frames, step.expected_exposure_s, rig)
+        if step.expected_exposure_s not in taken_s:
+            taken_s.add(step.expected_exposure_s)
             duration_s += _darks_s((step.expected_exposure_s,), rig.lamp.shutter_s, loaded)
-        done.append(replace(step, moves=moves, start_s=time_s, duration_s=duration_s))
+        scheduled.append(replace(step, start_s=time_s, duration_s=duration_s))
         time_s += duration_s
-    swaps = sum(_swapped(step, before) for step, before in zip(steps, (None, *steps), strict=False))
-    hands = sum(isinstance(rig.axes[m.axis], HandAxis) for step in done for m in step.moves)
-    return Plan(tuple(done), hidden, darks, time_s, swaps, hands)
+    hands = sum(isinstance(rig.axes[m.axis], HandAxis) for step in steps for m in step.moves)
+    return Plan(
+        steps=tuple(scheduled),
+        hidden=hidden,
+        darks_first_s=darks_s,
+        duration_s=time_s,
+        swaps=swaps,
+        hand_settings=hands,
+    )
 
 
 def _darks_s(exposures_s: Sequence[float], cover_s: float, loaded: Loaded) -> float:
-    """Darken the lamp, take the darks of these exposures, light it again."""
+    """Return the time to darken the lamp, take the darks of these exposures and light it again."""
     frames = loaded.protocol.dark_frames
     return 2 * cover_s + sum(_frames_s(frames, e, loaded.rig) for e in exposures_s)
 
 
 def _homing_s(rig: Rig) -> float:
-    motors = [axis for axis in (rig.axes[name] for name in AXES) if not isinstance(axis, HandAxis)]
-    return sum(axis.homing_s for axis in motors)
+    axes = (rig.axes[name] for name in AXES)
+    return sum(axis.homing_s for axis in axes if not isinstance(axis, HandAxis))
 
 
 def _frames_s(frames: int, exposure_s: float, rig: Rig) -> float:
     return frames * (exposure_s + rig.camera.frame_overhead_s)
-
-
-def _swapped(step: Step, before: Step | None) -> bool:
-    """Whether the operator changes sample and tile before this step (the first places one)."""
-    return before is None or before.surface != step.surface
-
-
-def _duration_s(step: Step, before: Step | None, moves: tuple[Move, ...], rig: Rig) -> float:
-    moving = sum(move.duration_s for move in moves)
-    swapping = rig.swap_s if _swapped(step, before) else 0.0
-    return moving + swapping + _frames_s(step.frames, step.expected_exposure_s, rig)
-
-
-def lamp_settings(plan: Plan) -> Iterator[tuple[int, float, float]]:
-    """Number, theta_i and dphi (degrees) of every place of the lamp, in order."""
-    seen = {s.lamp_setting: (s.pose.theta_i, s.pose.dphi) for s in plan.steps}
-    yield from ((number, *angles) for number, angles in sorted(seen.items()))

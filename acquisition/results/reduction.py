@@ -129,7 +129,7 @@ def _tile(reading: Reading, drift: Drift) -> _Tile:
     counts = [_relative([reading], name)[0] for name in names]
     return _Tile(
         rate(reading) / drift.at(reading.time_s),
-        float(np.linalg.norm([*counts, drift.u_beyond(reading.time_s)])),
+        float(np.linalg.norm([*counts, drift.u_extrapolated(reading.time_s)])),
         reading.flags,
     )
 
@@ -176,7 +176,7 @@ def _drift_noise(points: Sequence[Reading], drifts: Mapping[int, Drift]) -> tupl
     for number, drift in drifts.items():
         own = np.flatnonzero(block == number)
         if drift.level.size and own.size:
-            u, (before, share) = drift.u_relative, drift.between(time_s[own])
+            u, (before, share) = drift.u_relative, drift.interpolation(time_s[own])
             after = np.minimum(before + 1, u.size - 1)
             u_relative[0, own], check[0, own] = u[0], passed
             for made, part in ((before, 1.0 - share), (after, share)):

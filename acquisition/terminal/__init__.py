@@ -1,1 +1,1 @@
-"""acquisition/terminal."""
+"""Terminal input and output: consoles, progress bar, the operator; start with `console`."""

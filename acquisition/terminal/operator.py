@@ -1,4 +1,4 @@
-"""The operator at the terminal: prompts that wait for a person."""
+"""Operator at the terminal: prompts that wait for a person."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class TerminalOperator:
     """Asks on standard error and reads the answer from standard input."""
 
     def ask(self, request: Request) -> str:
-        """What the operator answers; Enter alone says that it is done. `q` stops the scan."""
+        """Return the answer, "done" for Enter alone; raise `OperatorStop` for `q` or no input."""
         more = "type the angle if it is another, " if request.action == "set axis" else ""
         try:
             answer = ask(f"\n{request.text}. Enter when done; {more}q to stop:")
@@ -26,26 +26,26 @@ class TerminalOperator:
         return answer or "done"
 
 
-def require_yes(question: str, nobody: str, otherwise: str) -> None:
-    """Nothing moves before somebody has said so.
+def require_yes(question: str, no_terminal: str, declined: str) -> None:
+    """Ask for permission to move.
 
-    Raises `InputError` with `nobody` where none can be asked, `OperatorStop` with `otherwise` on
-    any answer but yes.
+    Raises `InputError` with `no_terminal` if standard input is no terminal, and `OperatorStop` with
+    `declined` for any answer but yes.
     """
     if not sys.stdin.isatty():
-        raise InputError(nobody)
+        raise InputError(no_terminal)
     try:
         answer = ask(f"{question} [y/N]")
     except EOFError:
         answer = ""
     if answer.lower() not in ("y", "yes"):
-        raise OperatorStop(otherwise)
+        raise OperatorStop(declined)
 
 
-def require_terminal(what: str) -> None:
-    """Raise `InputError` where nobody can answer a prompt, before anything moves."""
+def require_terminal(protocol: str) -> None:
+    """Raise `InputError`, before anything moves, if no operator can answer prompts."""
     if not sys.stdin.isatty():
         raise InputError(
-            f"{what}: the operator has to serve the rig, but standard input is no terminal: start "
-            "it in one. Nothing has moved."
+            f"{protocol}: the rig needs an operator to answer prompts, but standard input is no "
+            "terminal: start the scan in one. Nothing has moved."
         )

@@ -92,7 +92,7 @@ def scan(
         if disk is not None:
             strike: Action = getattr(record, disk[0])
             triggers.plan(*disk[1], strike)
-        before = Progress(tuple(record.readings()), tuple(record.checks())) if known else None
+        before = Progress.of(record) if known else None
         try:
             scan_session.scan(loaded, make_plan(loaded), record, before)
         except GonioError as raised:

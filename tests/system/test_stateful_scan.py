@@ -30,6 +30,7 @@ from hypothesis.stateful import (
 
 from acquisition.commands.scan_session import scan
 from acquisition.engine.engine import Devices, Engine
+from acquisition.engine.resume import Progress
 from acquisition.plan.plan import Plan, make_plan
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded
@@ -37,7 +38,6 @@ from instrument.config.protocol import DriftCheck, References, WhiteTile
 from instrument.errors import DeviceError, InputError, OperatorStop
 from instrument.record.reading import Reading
 from instrument.record.record import FILE_NAME, Record
-from tests.acquisition.engine.test_resume import so_far
 from tests.support.scans import changed, small_scan, undated
 
 RAM = Path("/dev/shm")  # thousands of commits: not on a disk, where there is memory to write to
@@ -187,7 +187,7 @@ class ScanMachine(RuleBasedStateMachine):
 
     def run(self, end: str | None, at: int = LONGER, impatient: bool = False) -> None:
         """Scan, or go on, as the commands do, until a call of a device ends it."""
-        loaded, before = tiny_scan(), so_far(self.record) if self.begun else None
+        loaded, before = tiny_scan(), Progress.of(self.record) if self.begun else None
         self.begun = True
         self.wire = Tripwire(at, ENDS[end]() if end else None, impatient and end is not None)
         with (
@@ -242,7 +242,7 @@ class ScanMachine(RuleBasedStateMachine):
         """The engine that has ended drives nothing again."""
         calls = list(self.wire.calls)
         with pytest.raises(DeviceError, match="nothing moves again before the operator"):
-            self.engine.run(tiny_plan(), so_far(self.record))
+            self.engine.run(tiny_plan(), Progress.of(self.record))
         assert self.wire.calls == calls
 
     @rule()

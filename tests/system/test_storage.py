@@ -26,7 +26,7 @@ from instrument.record.record import Record
 from instrument.text.atomic_file import write_whole
 from tests.support.command import gonio
 from tests.support.paths import CONFIGS, ROOT
-from tests.support.scans import changed, small_scan, undated
+from tests.support.scans import small_scan, undated
 
 LOADED = small_scan()
 PLAN = make_plan(LOADED)
@@ -215,23 +215,6 @@ def test_a_read_only_folder_is_named_and_what_is_in_it_stays(
         assert "cannot be written" in done.stderr
         assert "look at the folder's permissions" in done.stderr
         assert "Traceback" not in done.stderr
-
-
-def test_frames_that_would_not_fit_are_refused_before_anything_moves(
-    protocol: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from acquisition.engine import frame_files as kept_frames
-    from instrument.errors import InputError
-
-    loaded = changed(LOADED, keep_frames=True)
-    needed = kept_frames.kept_bytes(PLAN, loaded)
-    camera = LOADED.rig.camera
-    frames = sum(step.frames for step in PLAN.steps)
-    assert needed == 2 * camera.width_px * camera.height_px * frames
-    usage = shutil.disk_usage(tmp_path)
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=needed - 1))
-    with pytest.raises(InputError, match=r"keep_frames: the frames need .* GB, and .* GB free"):
-        kept_frames.require_room(PLAN, loaded, tmp_path / "not yet" / "run")
 
 
 def test_a_file_is_written_whole_or_its_old_self_stays(

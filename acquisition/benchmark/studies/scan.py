@@ -22,7 +22,7 @@ from acquisition.benchmark.study import Study
 from acquisition.benchmark.trial import Trial
 from acquisition.engine.engine import Engine
 from acquisition.measure.window import window_at
-from acquisition.plan.exposure_ladder import longest_below
+from acquisition.plan.exposure_ladder import longest_exposure_s
 from acquisition.plan.plan import Plan, Step, make_plan
 from acquisition.results.fitting import measurements
 from acquisition.results.reduction import reduced_run
@@ -201,7 +201,7 @@ def _noise(brdf: FloatArray, geometry: Geometry, loaded: Loaded, plan: Plan) -> 
     camera, protocol = loaded.rig.camera, loaded.protocol
     per_s = loaded.rig.lamp.white_electrons_per_s * np.pi * brdf * np.cos(geometry.theta_i)
     wanted = protocol.exposure_target * camera.full_well_electrons / per_s
-    electrons = per_s * [longest_below(float(limit), camera) for limit in wanted]
+    electrons = per_s * [longest_exposure_s(float(limit), camera) for limit in wanted]
     pinhole, patch = Pinhole.of(loaded.rig), protocol.window
     pixels = [
         window_at(step.pose.theta_r, pinhole, patch.width_mm, patch.height_mm).pixels

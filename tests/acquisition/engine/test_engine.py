@@ -21,6 +21,7 @@ from instrument.errors import DeviceError, OperatorStop
 from instrument.record.record import FILE_NAME, Record
 from tests.support.paths import CONFIGS
 from tests.support.scans import changed, small_scan
+from tests.support.stand_ins import Spy
 
 
 @pytest.fixture(scope="module")
@@ -40,17 +41,6 @@ def run(loaded: Loaded, record: Record, devices: Devices | None = None) -> Plan:
     devices = devices or open_devices(loaded)
     Engine(loaded.protocol, loaded.rig, devices, record, [].append).run(plan)
     return plan
-
-
-class Spy:
-    """Passes everything on to a device and keeps the names of what was called."""
-
-    def __init__(self, device: object, calls: list[str], name: str) -> None:
-        self._device, self._calls, self._name = device, calls, name
-
-    def __getattr__(self, name: str) -> object:
-        self._calls.append(f"{self._name}.{name}")
-        return getattr(self._device, name)
 
 
 def test_every_step_of_the_plan_is_read_once_in_order(small: Loaded, record: Record) -> None:

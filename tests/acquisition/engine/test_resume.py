@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,17 +9,17 @@ import numpy as np
 import pytest
 
 from acquisition.engine.engine import Devices, Engine
-from acquisition.engine.resume import Progress
 from acquisition.measure.drift import Drift
-from acquisition.plan.plan import Step, make_plan
+from acquisition.plan.plan import make_plan
 from acquisition.results.reduction import reduce
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded
 from instrument.errors import DeviceError
 from instrument.record.reading import Reading
 from instrument.record.record import Record
-from tests.acquisition.engine.test_engine import Spy
 from tests.support.scans import changed, small_scan, undated
+from tests.support.stand_ins import Spy
+from tests.support.stopped_scan import scan
 
 
 @pytest.fixture(scope="module")
@@ -36,34 +35,6 @@ def whole(small: Loaded, tmp_path_factory: pytest.TempPathFactory) -> list[Readi
             make_plan(small)
         )
         return undated(record.readings())
-
-
-def so_far(record: Record) -> Progress:
-    return Progress(tuple(record.readings()), tuple(record.checks()))
-
-
-class Cut(Exception):
-    """The process dies here."""
-
-
-def scan(
-    loaded: Loaded,
-    record: Record,
-    upto: int | None = None,
-    changed_devices: Callable[[Devices], Devices] = lambda devices: devices,
-) -> None:
-    """Run or go on; dies once step `upto` is on disk."""
-
-    def on_step(step: Step) -> None:
-        if step.index == upto:
-            raise Cut
-
-    devices = changed_devices(open_devices(loaded))
-    before = so_far(record) if record.readings() else None
-    try:
-        Engine(loaded.protocol, loaded.rig, devices, record, on_step).run(make_plan(loaded), before)
-    except Cut:
-        return
 
 
 def test_cut_after_any_step_the_rest_is_the_same_to_the_last_digit(
@@ -149,7 +120,7 @@ def test_levels_after_a_jump_refer_to_the_first_check_of_all(whole: list[Reading
     plain = Drift.of(whole, 0)
     assert plain.level[0] == 1.0
     assert plain.at(drifts[1].time_s) == pytest.approx(plain.level[1])
-    before, share = plain.between(np.array([drifts[1].time_s]))
+    before, share = plain.interpolation(np.array([drifts[1].time_s]))
     assert (before.tolist(), share.tolist()) == ([1], [0.0])
 
 
@@ -191,23 +162,6 @@ def test_the_record_holds_what_every_device_said_it_is_set_to(
     assert set(settings) == {"camera", "theta_i", "dphi", "theta_r"}
     assert settings["theta_r"]["limits_deg"] == "-88 to 88"
     assert settings["camera"]["bit_depth"] == "12"
-
-
-def test_frames_that_are_kept_are_whole_and_named(small: Loaded, tmp_path: Path) -> None:
-    import cv2
-
-    loaded = changed(small, keep_frames=True)
-    with Record.create(tmp_path / "run", {}) as record:
-        scan(loaded, record, upto=2)
-        scan(loaded, record, upto=4)
-        files = record.frame_files()
-        readings = record.readings()
-    assert len(files) == sum(r.frames for r in readings)
-    assert sorted(files) == sorted(f"frames/{p.name}" for p in (tmp_path / "run/frames").iterdir())
-    image = cv2.imread(str(tmp_path / "run" / files[0]), cv2.IMREAD_UNCHANGED)
-    assert image.shape == (small.rig.camera.height_px, small.rig.camera.width_px)
-    assert image.dtype == "uint16"
-    assert image.max() >= readings[0].peak_dn
 
 
 def test_the_operator_s_word_is_asked_with_what_had_happened_and_written_down(

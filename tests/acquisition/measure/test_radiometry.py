@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import ndtr
 
-from acquisition.measure.radiometry import Dark, dark_of, measure, rounding_u_dn
+from acquisition.measure.radiometry import Dark, average_dark, measure, rounding_u_dn
 from acquisition.measure.window import Window, window_at
 from instrument.config.load import load_rig
 from instrument.devices import Frame
@@ -37,7 +37,7 @@ def _frames(mean: float, sd: float, count: int, seed: int = 1) -> list[Frame]:
 
 @cache
 def _dark() -> Dark:
-    return dark_of(_frames(64.0, 1.1, 8, seed=2), CAMERA)
+    return average_dark(_frames(64.0, 1.1, 8, seed=2), CAMERA)
 
 
 def test_the_dark_is_subtracted_and_cos4_divided_out() -> None:

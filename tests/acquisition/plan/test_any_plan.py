@@ -17,8 +17,9 @@ import pytest
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
-from acquisition.plan.moves import SAME_DEG, Move, NoPathError, Pose, home_pose, moves_between
-from acquisition.plan.plan import Plan, Step, hidden_below_deg, make_plan
+from acquisition.plan.moves import SAME_ANGLE_DEG, Move, NoPathError, moves_between
+from acquisition.plan.plan import Plan, Step, make_plan, min_separation_deg
+from acquisition.plan.pose import Pose, home_pose
 from instrument.config.axes import AXES, HandAxis
 from instrument.config.load import Loaded, load_protocol
 from instrument.config.protocol import DriftCheck, References, WhiteTile
@@ -131,7 +132,7 @@ def test_any_move_is_clear_whatever_the_order_of_its_axes(slow: bool) -> None:
         if moves is None:
             assert cause in {f"keep-out zone {zone.name}" for zone in zones}
         else:
-            assert follow(start, moves, rig) == pytest.approx(end, abs=2 * SAME_DEG)
+            assert follow(start, moves, rig) == pytest.approx(end, abs=2 * SAME_ANGLE_DEG)
 
     holds()
 
@@ -146,7 +147,7 @@ def asked(loaded: Loaded) -> list[Pose]:
 
 def visible(pose: Pose, loaded: Loaded) -> bool:
     apart_deg = camera_to_lamp_deg(pose.theta_i, pose.theta_r, pose.dphi)
-    return bool(apart_deg >= hidden_below_deg(loaded.rig))
+    return bool(apart_deg >= min_separation_deg(loaded.rig))
 
 
 def every_visible_geometry_is_a_point_once(plan: Plan, loaded: Loaded) -> None:

@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acquisition.plan.exposure_ladder import exposure_ladder_s, longest_below
-from acquisition.plan.keep_out import obstacle
-from acquisition.plan.moves import Pose, home_pose, moves_between
-from acquisition.plan.plan import hidden_below_deg, make_plan, sweep_poses
+from acquisition.plan.exposure_ladder import exposure_ladder_s, longest_exposure_s
+from acquisition.plan.keep_out import enters_zone
+from acquisition.plan.moves import moves_between
+from acquisition.plan.plan import make_plan, min_separation_deg, sweep_poses
+from acquisition.plan.pose import Pose, home_pose
 from instrument.config.load import Loaded, load_protocol
 from instrument.config.protocol import DriftCheck, References, Steps, WhiteTile
 from instrument.config.rig import KeepOut, Rig
@@ -62,7 +63,7 @@ def test_each_geometry_is_visited_once_or_counted_as_hidden(
     plan = make_plan(changed(demo, sweeps=[sweep], references=References()))
     seen = [step.pose for step in plan.points] + list(plan.hidden)
     assert len(seen) == len(set(seen)) == incidences * azimuths * views
-    limit = hidden_below_deg(demo.rig)
+    limit = min_separation_deg(demo.rig)
     apart = [float(camera_to_lamp_deg(p.theta_i, p.theta_r, p.dphi)) for p in plan.hidden]
     assert all(angle < limit for angle in apart)
 
@@ -137,8 +138,8 @@ def test_the_solid_angles_say_what_is_hidden_unless_the_housings_are_wider(
 ) -> None:
     # 0.003 sr is a cone of half-angle 1.771 deg, 0.0009 sr of 0.970 deg.
     bare = by_hand.rig.model_copy(update={"blocked_half_angle_deg": None})
-    assert hidden_below_deg(bare) == pytest.approx(2.741, abs=1e-3)
-    assert hidden_below_deg(demo.rig) == 3.0
+    assert min_separation_deg(bare) == pytest.approx(2.741, abs=1e-3)
+    assert min_separation_deg(demo.rig) == 3.0
 
 
 def test_angles_are_approached_from_below(demo: Loaded) -> None:
@@ -186,7 +187,7 @@ def test_the_closest_approach_is_not_missed(
         float(camera_to_lamp_deg(theta_i, start + (end - start) * n / 400, dphi))
         for n in range(401)
     )
-    met = obstacle(zone, Pose(theta_i, dphi, start), Pose(theta_i, dphi, end), "theta_r")
+    met = enters_zone(zone, Pose(theta_i, dphi, start), Pose(theta_i, dphi, end), "theta_r")
     assert met or sampled >= cone
     assert not met or sampled < cone + 0.25  # half a sample's step
 
@@ -208,8 +209,8 @@ def test_exposures_come_from_one_ladder_within_the_cameras_range(demo: Loaded) -
     assert ladder[0] == camera.min_exposure_s
     assert ladder[-1] <= camera.max_exposure_s
     assert all(b / a == pytest.approx(2**0.5, rel=1e-5) for a, b in pairwise(ladder))
-    assert all(longest_below(exposure, camera) == exposure for exposure in ladder)
-    assert longest_below(1e-9, camera) == ladder[0]
+    assert all(longest_exposure_s(exposure, camera) == exposure for exposure in ladder)
+    assert longest_exposure_s(1e-9, camera) == ladder[0]
 
 
 def test_the_lamp_is_set_once_by_hand_for_all_sweeps(by_hand: Loaded) -> None:
@@ -240,4 +241,4 @@ def test_one_line_for_each_thing_in_the_way(demo: Loaded) -> None:
 
 def test_a_blocked_angle_narrower_than_lamp_and_lens_counts_as_theirs(by_hand: Loaded) -> None:
     narrow = by_hand.rig.model_copy(update={"blocked_half_angle_deg": 0.5})
-    assert hidden_below_deg(narrow) == pytest.approx(2.741, abs=1e-3)
+    assert min_separation_deg(narrow) == pytest.approx(2.741, abs=1e-3)

@@ -43,8 +43,7 @@ def resumed_with_a_darker_lamp(tmp_path_factory: pytest.TempPathFactory) -> Path
         write_run_inputs(record)
         with pytest.raises(StoppedError):
             measure(loaded, None)
-        so_far = Progress(tuple(record.readings()), tuple(record.checks()))
-        measure(changed(loaded, rig={"lamp": lamp}), so_far)
+        measure(changed(loaded, rig={"lamp": lamp}), Progress.of(record))
         assert [check.jumped for check in record.checks()] == [True]
     return folder / "run"
 

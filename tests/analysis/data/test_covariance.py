@@ -8,17 +8,14 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from acquisition.engine.engine import Engine
 from acquisition.measure.drift import rate
-from acquisition.plan.plan import Step, make_plan
 from acquisition.results.reduction import DRIFT, reduce
-from acquisition.rig import open_devices
 from analysis.data.covariance import Covariance
 from instrument.config.load import Loaded
 from instrument.record.reading import Check, Reading
 from instrument.record.record import Record
-from tests.acquisition.engine.test_resume import Cut, so_far
 from tests.support.scans import small_scan
+from tests.support.stopped_scan import scan
 
 
 @pytest.fixture(scope="module")
@@ -32,17 +29,9 @@ def resumed(
 ) -> tuple[list[Reading], list[Check]]:
     """A scan that was stopped in its first block and went on; the check then says: jumped."""
 
-    def on_step(step: Step) -> None:
-        if step.index == 4:
-            raise Cut
-
     with Record.create(tmp_path_factory.mktemp("resumed") / "run", {}) as record:
-        plan = make_plan(small)
-        with pytest.raises(Cut):
-            Engine(small.protocol, small.rig, open_devices(small), record, on_step).run(plan)
-        Engine(small.protocol, small.rig, open_devices(small), record, [].append).run(
-            plan, so_far(record)
-        )
+        scan(small, record, upto=4)
+        scan(small, record)
         return record.readings(), [replace(check, jumped=True) for check in record.checks()]
 
 
@@ -92,7 +81,7 @@ def test_levels_are_those_of_the_checks(resumed: tuple[list[Reading], list[Check
     drift = Drift.of(resumed[0], 1)
     times_s = np.array([r.time_s for r in made])
     middle_s = (times_s[:-1] + times_s[1:]) / 2
-    before, share = drift.between(np.concatenate([times_s, middle_s]))
+    before, share = drift.interpolation(np.concatenate([times_s, middle_s]))
     assert before.tolist() == [0, 1, 2, 0, 1]
     assert share == pytest.approx([0, 0, 0, 0.5, 0.5])
     level = [rate(r) / rate(made[0]) for r in made]

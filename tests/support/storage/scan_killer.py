@@ -54,7 +54,7 @@ def scan(folder: Path, loaded: Loaded, plan: Plan, told: Callable[[int], None]) 
         told(step.index)
 
     with opened(folder) as record, record.claimed():
-        before = Progress(tuple(record.readings()), tuple(record.checks()))
+        before = Progress.of(record)
         if not before.missing(plan):
             return
         engine = Engine(loaded.protocol, loaded.rig, open_devices(loaded), record, on_step)

@@ -1,0 +1,46 @@
+"""Kept frames: whole, named in the record, and refused beforehand if the disk is too small."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import cv2
+import pytest
+
+from acquisition.engine.frame_files import frame_bytes, require_disk_space
+from acquisition.plan.plan import make_plan
+from instrument.errors import InputError
+from instrument.record.record import Record
+from tests.support.scans import changed, small_scan
+from tests.support.stopped_scan import scan
+
+LOADED = changed(small_scan(), keep_frames=True)
+
+
+def test_frames_that_would_not_fit_are_refused_before_anything_moves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = make_plan(LOADED)
+    needed = frame_bytes(plan, LOADED)
+    camera = LOADED.rig.camera
+    frames = sum(step.frames for step in plan.steps)
+    assert needed == 2 * camera.width_px * camera.height_px * frames
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=needed - 1))
+    with pytest.raises(InputError, match=r"keep_frames: the frames need .* GB, and .* GB free"):
+        require_disk_space(plan, LOADED, tmp_path / "not yet" / "run")
+
+
+def test_kept_frames_are_whole_and_named_in_the_record(tmp_path: Path) -> None:
+    with Record.create(tmp_path / "run", {}) as record:
+        scan(LOADED, record, upto=2)
+        scan(LOADED, record, upto=4)
+        files = record.frame_files()
+        readings = record.readings()
+    assert len(files) == sum(r.frames for r in readings)
+    assert sorted(files) == sorted(f"frames/{p.name}" for p in (tmp_path / "run/frames").iterdir())
+    image = cv2.imread(str(tmp_path / "run" / files[0]), cv2.IMREAD_UNCHANGED)
+    assert image.shape == (LOADED.rig.camera.height_px, LOADED.rig.camera.width_px)
+    assert image.dtype == "uint16"
+    assert image.max() >= readings[0].peak_dn
