@@ -96,7 +96,7 @@ class Drift:
 
     @property
     def u_relative(self) -> FloatArray:
-        """Standard uncertainty of every check due to noise, shape (checks,), relative to its signal."""
+        """Standard uncertainty due to noise of every check, shape (checks,), relative to it."""
         return np.concatenate([[], *(s.u_relative for s in self.segments)])
 
     def at(self, time_s: float) -> float:
