@@ -14,29 +14,8 @@ from typing import Literal
 from drivers.lines.modbus_bus import AnswerLost, ModbusBus, ModbusUnit
 from drivers.lines.modbus_client import BusSettings
 from drivers.lines.serial_line import REPLY_S
+from drivers.stages import oriental_framing as framing
 from drivers.stages.motor_stage import POLL_S, STARTS_WITHIN_S, Limits, MotorStage, Status, Stopped
-from drivers.stages.oriental_framing import (
-    DIRECT_DATA,
-    DIRECT_DATA_COUNT,
-    FEEDBACK_POSITION,
-    FULL_CURRENT,
-    HOME_END,
-    INPUT_WORD,
-    MOVE,
-    OUTPUT,
-    OUTPUT_AND_ALARM_COUNT,
-    READY,
-    STOP,
-    ZHOME,
-    Output,
-    az_mismatch,
-    degrees_of,
-    direct_data_of,
-    move_block,
-    output_of,
-    steps_of,
-    value_of,
-)
 from instrument.clock import Clock
 from instrument.errors import DeviceError, InputError
 
@@ -59,7 +38,7 @@ class OrientalSettings:
     baudrate: int = 115200
     parity: Literal["E", "N", "O"] = "E"
     unit: int = 1
-    current: int = FULL_CURRENT
+    current: int = framing.FULL_CURRENT
     reply_s: float = REPLY_S
 
     def __post_init__(self) -> None:
@@ -70,8 +49,10 @@ class OrientalSettings:
                 f"tolerance_deg: {self.limits.tolerance_deg:g} deg: less than half a step "
                 f"({0.5 / self.steps_per_deg:g} deg) cannot be kept"
             )
-        if not 0 < self.current <= FULL_CURRENT:
-            raise InputError(f"current: {self.current}: 1 to {FULL_CURRENT}, in 0.1 %, is allowed")
+        if not 0 < self.current <= framing.FULL_CURRENT:
+            raise InputError(
+                f"current: {self.current}: 1 to {framing.FULL_CURRENT}, in 0.1 %, is allowed"
+            )
 
     @property
     def bus(self) -> BusSettings:
@@ -92,7 +73,9 @@ class OrientalStage(MotorStage):
         self._settings = settings
         self._bus = bus or ModbusBus(name, settings.bus, clock)
         self._owns_bus = bus is None
-        self._drive = ModbusUnit(self._bus, name, settings.unit, DIRECT_DATA, _RESYNC_COUNTS)
+        self._drive = ModbusUnit(
+            self._bus, name, settings.unit, framing.DIRECT_DATA, _RESYNC_COUNTS
+        )
         self._stops, self._cleared = 0, -1  # stops sent; how many of them are cleared in 007D
         try:
             self.opening_report, self._target_steps = self._identify()
@@ -109,9 +92,9 @@ class OrientalStage(MotorStage):
         until_s = self._drive.deadline_s() if retry else self._clock.now_s()
         output = self._output(until_s)  # first: the position read after it is then one at rest
         return Status(
-            degrees_of(self._feedback(until_s), self._settings.steps_per_deg),
-            moving=output.has(MOVE),
-            homed=output.has(HOME_END),
+            framing.degrees_of(self._feedback(until_s), self._settings.steps_per_deg),
+            moving=output.has(framing.MOVE),
+            homed=output.has(framing.HOME_END),
             fault=output.fault,
         )
 
@@ -129,8 +112,8 @@ class OrientalStage(MotorStage):
         """Return a report of the registers and the target held; refuse what is no AZ drive."""
         until_s = self._drive.deadline_s()
         output = self._output(until_s)
-        data = direct_data_of(self._drive.read(DIRECT_DATA, DIRECT_DATA_COUNT, until_s))
-        mismatch = az_mismatch(data, output)
+        data = self._direct_data(until_s)
+        mismatch = framing.az_mismatch(data, output)
         if mismatch:
             raise DeviceError(
                 f"{self.name}: {self._drive.where} is no Oriental Motor AZ drive: {mismatch}: look "
@@ -141,7 +124,7 @@ class OrientalStage(MotorStage):
 
     def _send_home(self) -> None:
         self._wait_until_ready("look for its reference")
-        self._set_inputs(ZHOME)
+        self._set_inputs(framing.ZHOME)
         self._set_inputs(0)
 
     def _apply_speed(self) -> None:
@@ -149,11 +132,11 @@ class OrientalStage(MotorStage):
 
     def _send_move(self, angle_deg: float) -> None:
         scale, limits = self._settings.steps_per_deg, self._limits
-        target = steps_of(angle_deg, scale)
-        block = move_block(
+        target = framing.steps_of(angle_deg, scale)
+        block = framing.move_block(
             target,
-            steps_of(limits.speed_deg_per_s, scale),
-            steps_of(limits.acceleration_deg_per_s2, scale),
+            framing.steps_of(limits.speed_deg_per_s, scale),
+            framing.steps_of(limits.acceleration_deg_per_s2, scale),
             self._settings.current,
         )
         self._wait_until_ready("move")
@@ -162,13 +145,13 @@ class OrientalStage(MotorStage):
         def taken() -> bool:
             return self._move_taken(target, before, until_s)
 
-        self._write_once(DIRECT_DATA, block, taken, until_s)
+        self._write_once(framing.DIRECT_DATA, block, taken, until_s)
         self._target_steps = target
 
     def _send_stop(self) -> None:
         self._stops += 1  # before it is sent: the next motion must clear it
         try:
-            self._drive.write_at_once(INPUT_WORD, STOP)
+            self._drive.write_at_once(framing.INPUT_WORD, framing.STOP)
         except AnswerLost as lost:
             raise type(lost)(f"{lost}; STOP was not acknowledged: it may still move") from lost
 
@@ -179,15 +162,14 @@ class OrientalStage(MotorStage):
             self._set_inputs(0)
             self._cleared = stops
         begun_s = self._clock.now_s()
-        while not (output := self._output(self._drive.deadline_s())).has(READY):
+        while not (output := self._output(self._drive.deadline_s())).has(framing.READY):
             self._raise_if_stopped()
             if output.fault:
                 raise DeviceError(f"{self.name}: {output.fault}")
             if self._clock.now_s() - begun_s > STARTS_WITHIN_S:
                 raise DeviceError(
                     f"{self.name}: its drive is not ready to {purpose} (output {output.word:04X} "
-                    "hex, READY is bit 5): look at its motor's supply, and at its STOP and FREE "
-                    "inputs"
+                    "hex, READY is bit 5): look at its motor's supply and its STOP and FREE inputs"
                 )
             self._clock.sleep(POLL_S)
 
@@ -196,18 +178,18 @@ class OrientalStage(MotorStage):
         until_s = self._drive.deadline_s()
 
         def taken() -> bool:
-            return self._drive.read(INPUT_WORD, 1, until_s) == [word]
+            return self._drive.read(framing.INPUT_WORD, 1, until_s) == [word]
 
-        self._write_once(INPUT_WORD, (word,), taken, until_s)
+        self._write_once(framing.INPUT_WORD, (word,), taken, until_s)
 
     def _move_taken(self, target: int, before: int, until_s: float) -> bool:
         """Return True if a move whose answer was lost has been executed."""
-        data = direct_data_of(self._drive.read(DIRECT_DATA, DIRECT_DATA_COUNT, until_s))
+        data = self._direct_data(until_s)
         self._target_steps = data.position
         if data.position != target or before != target:
             return data.position == target
         # The target is the previous one: only motion or arrival shows that the move was taken.
-        if self._output(until_s).has(MOVE):
+        if self._output(until_s).has(framing.MOVE):
             return True
         allowed = self._limits.tolerance_deg * self._settings.steps_per_deg
         return abs(self._feedback(until_s) - target) <= allowed
@@ -240,8 +222,14 @@ class OrientalStage(MotorStage):
         if self._stopped:
             raise Stopped(f"{self.name}: stopped before it began to move")
 
-    def _output(self, until_s: float) -> Output:
-        return output_of(self._drive.read(OUTPUT, OUTPUT_AND_ALARM_COUNT, until_s))
+    def _output(self, until_s: float) -> framing.Output:
+        return framing.output_of(
+            self._drive.read(framing.OUTPUT, framing.OUTPUT_AND_ALARM_COUNT, until_s)
+        )
+
+    def _direct_data(self, until_s: float) -> framing.DirectData:
+        words = self._drive.read(framing.DIRECT_DATA, framing.DIRECT_DATA_COUNT, until_s)
+        return framing.direct_data_of(words)
 
     def _feedback(self, until_s: float) -> int:
-        return value_of(self._drive.read(FEEDBACK_POSITION, 2, until_s))
+        return framing.value_of(self._drive.read(framing.FEEDBACK_POSITION, 2, until_s))

@@ -14,7 +14,6 @@ from instrument.errors import DeviceError
 
 DIRECT_DATA = 0x0058  # the first of the 16 registers of a direct data operation
 DIRECT_DATA_COUNT = 16
-TARGET = 0x005C  # the target position, in that block
 INPUT_WORD = 0x007D  # driver input command, low word
 OUTPUT = 0x007E  # driver output status, 2 registers; the alarm code's 2 follow it at 0080
 OUTPUT_AND_ALARM_COUNT = 4

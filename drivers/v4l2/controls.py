@@ -1,36 +1,39 @@
-"""A camera's controls, set and read back: what the camera made of it is never taken on trust."""
+"""Camera controls (exposure, gain, gamma): set, read back and compared."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass
 
-from drivers.v4l2 import ioctl as v4l2
+from drivers.v4l2 import ioctl
 from instrument.errors import DeviceError
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
-    """A control in words, and how its number reads as a quantity: `factor` times it, `unit`."""
+class LabelledControl:
+    """A control's label, and the quantity for its number: `factor` times the number, in `unit`."""
 
     number: int
-    words: str
+    label: str
     factor: float = 1.0
     unit: str = ""
 
     def text(self, value: int) -> str:
-        """The control's number as a quantity."""
+        """Return the control's number as a quantity with its unit."""
         return f"{value * self.factor:g}{self.unit}"
 
 
-EXPOSURE = Wish(v4l2.EXPOSURE_ABSOLUTE, "exposure", 1e-4, " s")
-GAIN = Wish(v4l2.GAIN, "gain")
-_GAMMA = Wish(v4l2.GAMMA, "gamma", 0.01)  # a USB camera's gamma counts hundredths
+EXPOSURE = LabelledControl(ioctl.EXPOSURE_ABSOLUTE, "exposure", 1e-4, " s")
+GAIN = LabelledControl(ioctl.GAIN, "gain")
+_GAMMA = LabelledControl(ioctl.GAMMA, "gamma", 0.01)  # a USB camera's gamma counts hundredths
 _LINEAR = 100
-_AUTOMATICS = (
-    (Wish(v4l2.EXPOSURE_AUTO, "manual exposure, which is mode"), 1),  # V4L2_EXPOSURE_MANUAL
-    (Wish(v4l2.AUTOGAIN, "automatic gain"), 0),
-    (Wish(v4l2.AUTO_WHITE_BALANCE, "automatic white balance"), 0),
+_AUTOMATIC = (
+    (
+        LabelledControl(ioctl.EXPOSURE_AUTO, "manual exposure, which is mode"),
+        1,
+    ),  # V4L2_EXPOSURE_MANUAL
+    (LabelledControl(ioctl.AUTOGAIN, "automatic gain"), 0),
+    (LabelledControl(ioctl.AUTO_WHITE_BALANCE, "automatic white balance"), 0),
 )
 
 
@@ -40,72 +43,75 @@ class Controls:
     def __init__(self, descriptor: int, who: str) -> None:
         self._descriptor, self._who = descriptor, who
         self.read_back: dict[str, str] = {}
-        """What was set, as the camera then said it was."""
+        """Each control that was set, as the camera reported it afterwards."""
 
-    def leave_nothing_automatic(self) -> list[str]:
-        """Switch off what would change counts by itself, where there is such a thing.
+    def disable_automatic(self) -> list[str]:
+        """Switch off every automatic control that would change the counts.
 
-        Returns what could not be made neutral, in words.
+        Returns the controls that could not be made neutral, in words.
         """
-        for wish, value in _AUTOMATICS:
-            if v4l2.control(self._descriptor, wish.number) is not None:
-                self.set(wish, value)
+        for control, value in _AUTOMATIC:
+            if ioctl.control(self._descriptor, control.number) is not None:
+                self.set(control, value)
         return self._linear_gamma()
 
     def _linear_gamma(self) -> list[str]:
-        gamma = v4l2.control(self._descriptor, v4l2.GAMMA)
+        gamma = ioctl.control(self._descriptor, ioctl.GAMMA)
         if gamma is None:
             return []
-        if not gamma.least <= _LINEAR <= gamma.greatest:
-            span = f"{gamma.least} to {gamma.greatest}"
+        if not gamma.minimum <= _LINEAR <= gamma.maximum:
+            span = f"{gamma.minimum} to {gamma.maximum}"
             return [f"gamma of unknown scale ({span}) left at {gamma.value}"]
         self.set(_GAMMA, _LINEAR)
         return []
 
-    def check_range(self, wish: Wish, *values: int) -> v4l2.Control:
-        """The control; an error when it is missing or does not allow one of the values."""
-        one = v4l2.control(self._descriptor, wish.number)
-        if one is None:
+    def check_range(self, control: LabelledControl, *values: int) -> ioctl.Control:
+        """Return the camera's control; raise if it is missing or does not allow a value."""
+        found = ioctl.control(self._descriptor, control.number)
+        if found is None:
             self._check_presence()
             raise DeviceError(
-                f"{self._who}: {wish.words} {wish.text(values[0])} asked for, but the camera has "
-                "no such control; leave it out of the rig file, or use another camera"
+                f"{self._asked(control, values[0])}, but the camera has no such control; leave it "
+                "out of the rig file, or use another camera"
             )
         for value in values:
-            if not one.least <= value <= one.greatest:
+            if not found.minimum <= value <= found.maximum:
                 raise DeviceError(
-                    f"{self._who}: {wish.words} {wish.text(value)} asked for; the camera allows "
-                    f"{_range(one, wish)}; change the rig file"
+                    f"{self._asked(control, value)}; the camera allows {_range(found, control)}; "
+                    "change the rig file"
                 )
-        return one
+        return found
 
-    def set(self, wish: Wish, value: int) -> int:
+    def set(self, control: LabelledControl, value: int) -> int:
         """Set a control and read it back; anything but exactly this value is an error."""
-        one = self.check_range(wish, value)
-        asked = f"{self._who}: {wish.words} {wish.text(value)} asked for"
+        found = self.check_range(control, value)
+        asked = self._asked(control, value)
         try:
-            v4l2.set_control(self._descriptor, one.number, value)
+            ioctl.set_control(self._descriptor, found.number, value)
         except OSError as error:
             self._check_presence()
             raise DeviceError(
                 f"{asked}; the camera refused it ({os.strerror(error.errno or 0)}) although it "
-                f"allows {_range(one, wish)}; look whether another program uses the camera, "
+                f"allows {_range(found, control)}; look whether another program uses the camera, "
                 "or plug it in anew"
             ) from error
-        found = v4l2.control_value(self._descriptor, one.number)
-        if found != value:
+        read_back = ioctl.control_value(self._descriptor, found.number)
+        if read_back != value:
             raise DeviceError(
-                f"{asked}, the camera took {wish.text(found)}; it says that it allows "
-                f"{_range(one, wish)}; ask for what the camera can do"
+                f"{asked}, the camera took {control.text(read_back)}; it says that it allows "
+                f"{_range(found, control)}; ask for what the camera can do"
             )
-        self.read_back[wish.words] = wish.text(found)
-        return found
+        self.read_back[control.label] = control.text(read_back)
+        return read_back
+
+    def _asked(self, control: LabelledControl, value: int) -> str:
+        return f"{self._who}: {control.label} {control.text(value)} asked for"
 
     def _check_presence(self) -> None:
-        """An OSError of its own when it is the camera, not the control, that is missing."""
-        v4l2.capability(self._descriptor)
+        """Raise OSError if the camera, and not only the control, is missing."""
+        ioctl.capability(self._descriptor)
 
 
-def _range(one: v4l2.Control, wish: Wish) -> str:
-    span = f"{wish.text(one.least)} to {wish.text(one.greatest)}"
-    return f"{span} in steps of {wish.text(one.step)}"
+def _range(found: ioctl.Control, control: LabelledControl) -> str:
+    span = f"{control.text(found.minimum)} to {control.text(found.maximum)}"
+    return f"{span} in steps of {control.text(found.step)}"

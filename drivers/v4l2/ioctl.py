@@ -1,6 +1,6 @@
-"""Video4Linux2 requests: numbers, structures as bytes, and the calls that need no stream.
+"""Video4Linux2 requests: numbers, structure layouts, and the calls that need no stream.
 
-Layouts are those of linux/videodev2.h on a 64-bit machine; only single-plane capture is known.
+Layouts are those of linux/videodev2.h on a 64-bit machine; single-plane capture only.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ REQBUFS_STRUCT = Struct("<IIII4x")  # count, type, memory, capabilities
 BUFFER_STRUCT = Struct("<5I4xqq16xIIQI12x")
 PARM_STRUCT = Struct("<IIIII184x")  # type, capability, mode, seconds per frame as a fraction
 CONTROL_STRUCT = Struct("<Ii")  # id, value
-# id, kind, name, least, greatest, step, default, flags
+# id, kind, name, minimum, maximum, step, default, flags
 QUERYCTRL_STRUCT = Struct("<II32siiiiI8x")
-# index, fourcc, kind, then width, height; or least, greatest, step of width and of height
+# index, fourcc, kind, then width, height; or minimum, maximum, step of width and of height
 FRAMESIZE_STRUCT = Struct("<IIIIIIIII8x")
 
 BUFFER_QUEUED, BUFFER_DONE, BUFFER_ERROR = 0x2, 0x4, 0x40
@@ -80,27 +80,27 @@ KINDS = {
     9: "menu",
 }
 _NEXT, _DISABLED, _WITHOUT_VALUE = 0x80000000, 0x1, (4, 5, 6, 7)
-_MOST_ANSWERS = 256  # a driver that never refuses a number must not hold us for ever
+_MAX_ENTRIES = 256  # a driver that never refuses an index must not cause an endless loop
 
 
 def fourcc(name: str) -> int:
-    """The number of a pixel format's name of up to four letters, "Y16" as "GREY"."""
+    """Return the number of a pixel format's name, padded to four letters ("Y16", "GREY")."""
     return int.from_bytes(name.ljust(4).encode("ascii"), "little")
 
 
 def fourcc_name(number: int) -> str:
-    """The name of a pixel format's number, without padding."""
+    """Return the name of a pixel format's number, without padding."""
     return number.to_bytes(4, "little").decode("ascii", "replace").rstrip()
 
 
 def text(raw: bytes) -> str:
-    """A zero-terminated text of a structure."""
+    """Decode a zero-terminated text of a structure."""
     return raw.split(b"\0", 1)[0].decode("utf-8", "replace")
 
 
 @dataclass(frozen=True, slots=True)
 class Capability:
-    """Who a device says it is."""
+    """Driver, card and bus as reported by a device."""
 
     driver: str
     card: str
@@ -109,7 +109,7 @@ class Capability:
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """The picture that a device is set to."""
+    """Image format of a device."""
 
     name: str
     width_px: int
@@ -120,13 +120,13 @@ class Format:
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """A control: its range and what it stands at; `value` is None where it cannot be read."""
+    """A control with its range and its value; the value is None if it cannot be read."""
 
     number: int
     name: str
     kind: str
-    least: int
-    greatest: int
+    minimum: int
+    maximum: int
     step: int
     default: int
     value: int | None = None
@@ -145,7 +145,7 @@ class Buffer:
 
 @contextmanager
 def opened(device: str) -> Iterator[int]:
-    """A descriptor of its own on `device`: for questions and controls, never for streaming."""
+    """Open a separate descriptor on `device`, for queries and controls but not for streaming."""
     descriptor = os.open(device, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
     try:
         yield descriptor
@@ -154,21 +154,21 @@ def opened(device: str) -> Iterator[int]:
 
 
 def _call(descriptor: int, request: int, argument: bytes) -> bytes:
-    """One request; raises OSError as the system does."""
+    """Make one request and return the structure filled in; raises OSError."""
     memory = bytearray(argument)
     fcntl.ioctl(descriptor, request, memory)
     return bytes(memory)
 
 
 def capability(descriptor: int) -> Capability:
-    """Who answers on this descriptor."""
+    """Return driver, card and bus of the device behind a descriptor."""
     answer = _call(descriptor, QUERYCAP, bytes(CAPABILITY_STRUCT.size))
     driver, card, bus, *_ = CAPABILITY_STRUCT.unpack(answer)
     return Capability(text(driver), text(card), text(bus))
 
 
 def current_format(descriptor: int) -> Format:
-    """The picture that the device is set to."""
+    """Return the device's image format."""
     asked = FORMAT_STRUCT.pack(CAPTURE, *[0] * 7)
     answer = FORMAT_STRUCT.unpack(_call(descriptor, G_FMT, asked))
     _, width, height, number, _, per_line, total, _ = answer
@@ -176,7 +176,7 @@ def current_format(descriptor: int) -> Format:
 
 
 def frame_period_s(descriptor: int) -> float | None:
-    """The frame period that the device says it has; None where it says nothing."""
+    """Return the frame period stated by the device, in seconds, or None."""
     try:
         answer = _call(descriptor, G_PARM, PARM_STRUCT.pack(CAPTURE, 0, 0, 0, 0))
     except OSError:
@@ -186,7 +186,7 @@ def frame_period_s(descriptor: int) -> float | None:
 
 
 def buffer_state(descriptor: int, index: int) -> Buffer:
-    """The state of one buffer, on the descriptor that streams."""
+    """Return the state of one buffer; the descriptor must be the one that streams."""
     asked = BUFFER_STRUCT.pack(index, CAPTURE, 0, 0, 0, 0, 0, 0, MMAP, 0, 0)
     answer = BUFFER_STRUCT.unpack(_call(descriptor, QUERYBUF, asked))
     number, _, used, flags, _, seconds, microseconds, sequence, *_ = answer
@@ -194,29 +194,36 @@ def buffer_state(descriptor: int, index: int) -> Buffer:
 
 
 def control_value(descriptor: int, number: int) -> int:
-    """What a control stands at."""
+    """Return the value of a control."""
     answer = _call(descriptor, G_CTRL, CONTROL_STRUCT.pack(number, 0))
     value: int = CONTROL_STRUCT.unpack(answer)[1]
     return value
 
 
 def set_control(descriptor: int, number: int, value: int) -> None:
-    """Set a control; the device may clamp the value without a word: read it back."""
+    """Set a control; the device may clamp the value silently, so read it back."""
     _call(descriptor, S_CTRL, CONTROL_STRUCT.pack(number, value))
 
 
 def control(descriptor: int, number: int) -> Control | None:
-    """One control's range and value; None where the device has no such control."""
+    """Return a control's range and value; None if the device has no such control."""
     try:
         answer = _call(descriptor, QUERYCTRL, QUERYCTRL_STRUCT.pack(number, 0, b"", *[0] * 5))
     except OSError:
         return None
-    found, kind, name, least, greatest, step, default, flags = QUERYCTRL_STRUCT.unpack(answer)
+    found, kind, name, minimum, maximum, step, default, flags = QUERYCTRL_STRUCT.unpack(answer)
     if flags & _DISABLED:
         return None
-    value = None if kind in _WITHOUT_VALUE else _value_or_none(descriptor, found)
-    label = KINDS.get(kind, str(kind))
-    return Control(found, text(name), label, least, greatest, step, default, value)
+    return Control(
+        number=found,
+        name=text(name),
+        kind=KINDS.get(kind, str(kind)),
+        minimum=minimum,
+        maximum=maximum,
+        step=step,
+        default=default,
+        value=None if kind in _WITHOUT_VALUE else _value_or_none(descriptor, found),
+    )
 
 
 def _value_or_none(descriptor: int, number: int) -> int | None:
@@ -227,7 +234,7 @@ def _value_or_none(descriptor: int, number: int) -> int | None:
 
 
 def controls(descriptor: int) -> list[Control]:
-    """All controls but the headings of their classes."""
+    """Return all controls except the headings of their classes."""
     found: list[Control] = []
     number = 0
     while True:
@@ -237,17 +244,17 @@ def controls(descriptor: int) -> list[Control]:
         except OSError:
             return found
         number = QUERYCTRL_STRUCT.unpack(answer)[0]
-        one = control(descriptor, number)
-        if one is not None and one.kind != "class":
-            found.append(one)
+        entry = control(descriptor, number)
+        if entry is not None and entry.kind != "class":
+            found.append(entry)
 
 
 Found = TypeVar("Found")
 
 
 def _numbered(ask: Callable[[int], Found]) -> Iterator[Found]:
-    """What the device answers for 0, 1, 2 … until it refuses a number."""
-    for number in range(_MOST_ANSWERS):
+    """Yield the device's answers for index 0, 1, 2 … until it refuses one."""
+    for number in range(_MAX_ENTRIES):
         try:
             answer = ask(number)
         except OSError:
@@ -256,7 +263,7 @@ def _numbered(ask: Callable[[int], Found]) -> Iterator[Found]:
 
 
 def formats(descriptor: int) -> list[str]:
-    """Names of the pixel formats that the device offers."""
+    """Return the names of the pixel formats that the device offers."""
 
     def ask(index: int) -> str:
         asked = FMTDESC_STRUCT.pack(index, CAPTURE, 0, b"", 0)
@@ -266,14 +273,14 @@ def formats(descriptor: int) -> list[str]:
 
 
 def sizes(descriptor: int, pixel_format: str) -> list[str]:
-    """Sizes in pixels that go with a format: "640 x 480", or from the least to the greatest."""
+    """Return the sizes of a format in pixels: "640 x 480", or one range with its steps."""
     found = []
     for kind, *numbers in _numbered(lambda n: _size(descriptor, pixel_format, n)):
         if kind == DISCRETE:
             found.append(f"{numbers[0]} x {numbers[1]}")
             continue
-        least_x, greatest_x, step_x, least_y, greatest_y, step_y = numbers
-        span = f"{least_x} x {least_y} to {greatest_x} x {greatest_y}"
+        min_x, max_x, step_x, min_y, max_y, step_y = numbers
+        span = f"{min_x} x {min_y} to {max_x} x {max_y}"
         return [f"{span} in steps of {step_x} x {step_y}"]
     return found
 

@@ -1,4 +1,4 @@
-"""What V4L2 cameras there are and what each can do, asked without starting a stream."""
+"""List of the V4L2 cameras and their capabilities, read without starting a stream."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.v4l2 import ioctl as v4l2
+from drivers.v4l2 import ioctl
 from instrument.errors import DeviceError
 
 
 @dataclass(frozen=True, slots=True)
 class OfferedFormat:
-    """A pixel format and the sizes that go with it, in words."""
+    """A pixel format and the sizes available with it, as text."""
 
     name: str
     sizes: tuple[str, ...]
@@ -20,38 +20,38 @@ class OfferedFormat:
 
 @dataclass(frozen=True, slots=True)
 class CameraDescription:
-    """What a camera says of itself; `current` is the picture that it is set to."""
+    """Capabilities reported by a camera; `current` is its present image format."""
 
     device: str
-    capability: v4l2.Capability
+    capability: ioctl.Capability
     formats: tuple[OfferedFormat, ...]
-    controls: tuple[v4l2.Control, ...]
-    current: v4l2.Format
+    controls: tuple[ioctl.Control, ...]
+    current: ioctl.Format
 
     def __str__(self) -> str:
-        """For a person: a line for what it is, one a format, one a control."""
+        """Return one line for the device, one per format and one per control."""
         c = self.capability
         lines = [f"  {self.device}: {c.card} ({c.driver}, {c.bus})"]
         for offered in self.formats:
             sizes = ", ".join(offered.sizes)
             lines.append(f"    {offered.name}: {sizes or 'any size'}")
         for control in self.controls:
-            span = f"{control.least} to {control.greatest} in steps of {control.step}"
+            span = f"{control.minimum} to {control.maximum} in steps of {control.step}"
             lines.append(f"    {control.name} ({control.kind}): {control.value}; {span}")
         return "\n".join(lines)
 
 
 def video_devices(root: Path = Path("/dev")) -> list[str]:
-    """Device paths: those of v4l/by-id, which outlast unplugging; without any, those of video*."""
+    """Return the paths in v4l/by-id, which survive unplugging, or else those of video*."""
     by_id = sorted(str(path) for path in root.glob("v4l/by-id/*"))
     numbered = (path for path in root.glob("video*") if path.name[5:].isdigit())
     return by_id or [str(path) for path in sorted(numbered, key=lambda p: int(p.name[5:]))]
 
 
 def describe(device: str) -> CameraDescription:
-    """Ask a camera what it is and can do. It need not be free: nothing is changed."""
+    """Read a camera's capabilities. It may be in use: nothing is changed."""
     try:
-        with v4l2.opened(device) as descriptor:
+        with ioctl.opened(device) as descriptor:
             return _description(device, descriptor)
     except OSError as error:
         raise DeviceError(
@@ -62,14 +62,13 @@ def describe(device: str) -> CameraDescription:
 
 
 def _description(device: str, descriptor: int) -> CameraDescription:
-    offered = [
-        OfferedFormat(name, tuple(v4l2.sizes(descriptor, name)))
-        for name in v4l2.formats(descriptor)
-    ]
     return CameraDescription(
-        device,
-        v4l2.capability(descriptor),
-        tuple(offered),
-        tuple(v4l2.controls(descriptor)),
-        v4l2.current_format(descriptor),
+        device=device,
+        capability=ioctl.capability(descriptor),
+        formats=tuple(
+            OfferedFormat(name, tuple(ioctl.sizes(descriptor, name)))
+            for name in ioctl.formats(descriptor)
+        ),
+        controls=tuple(ioctl.controls(descriptor)),
+        current=ioctl.current_format(descriptor),
     )

@@ -1,7 +1,7 @@
-"""Opening a V4L2 camera by OpenCV and setting its picture, all of it read back by request.
+"""Open a V4L2 camera with OpenCV and set its image format; every setting is read back.
 
-OpenCV reports success for a substitute format and for another size. Format, size and number of
-buffers each restart the stream, so they come before the controls.
+OpenCV reports success even if the camera took another format or size. Format, size and number of
+buffers each restart the stream, so they are set before the controls.
 """
 
 from __future__ import annotations
@@ -10,39 +10,39 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivers.v4l2 import ioctl as v4l2
+from drivers.v4l2 import ioctl
 from drivers.v4l2.settings import V4l2Settings
 from instrument.errors import CameraLost, DeviceError
 
 if TYPE_CHECKING:
     from cv2 import VideoCapture
 
-CABLE = "look at the USB cable, at the camera and at the computer, and at the hub between"
-_LEAST_BUFFERS = 2
+CHECK_CABLE = "look at the USB cable, at the camera and at the computer, and at the hub between"
+_MIN_BUFFERS = 2
 
 
-def lost(who: str, error: OSError) -> CameraLost:
-    """What to say of a camera that no longer answers."""
+def camera_lost(who: str, error: OSError) -> CameraLost:
+    """Return the error for a camera that no longer answers."""
     return CameraLost(
-        f"{who}: is gone ({os.strerror(error.errno or 0)}), unplugged or without power; {CABLE}; "
-        "the next try opens the camera anew"
+        f"{who}: is gone ({os.strerror(error.errno or 0)}), unplugged or without power; "
+        f"{CHECK_CABLE}; the next try opens the camera anew"
     )
 
 
 def open_control(settings: V4l2Settings) -> int:
-    """A descriptor for questions and controls, beside the one that OpenCV streams on."""
+    """Open a descriptor for queries and controls, beside the one that OpenCV streams on."""
     try:
         return os.open(settings.device, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError as error:
         raise CameraLost(
-            f"camera {settings.device}: cannot be opened ({os.strerror(error.errno or 0)}); {CABLE}"
-            ", and that the rig file names a device that `gonio devices` lists"
+            f"camera {settings.device}: cannot be opened ({os.strerror(error.errno or 0)}); "
+            f"{CHECK_CABLE}, and that the rig file names a device that `gonio devices` lists"
         ) from error
 
 
 def open_video(settings: V4l2Settings, control: int, who: str) -> tuple[VideoCapture, int | None]:
-    """OpenCV's capture, set to the picture, and the descriptor that it streams on, if found."""
-    # In whole seconds, and read once: the least that ends a wait for a dead stream.
+    """Return OpenCV's capture, set and checked, and the descriptor that it streams on, if found."""
+    # In whole seconds, and read once: the shortest wait for a dead stream.
     os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")
     import cv2
 
@@ -50,14 +50,14 @@ def open_video(settings: V4l2Settings, control: int, who: str) -> tuple[VideoCap
     video = cv2.VideoCapture(settings.device, cv2.CAP_V4L2)
     try:
         if not video.isOpened():
-            v4l2.capability(control)
+            ioctl.capability(control)
             raise CameraLost(
                 f"{who}: is there, but OpenCV cannot open it: no buffers, or no format that OpenCV "
                 "knows; look whether another program uses the camera, or plug it in anew"
             )
-        _set_picture(video, settings)
+        _set_format(video, settings)
         stream = _stream_descriptor(before, control)
-        _check_picture(video, settings, control, who)
+        _check_format(video, settings, control, who)
         _check_buffers(video, stream, who)
     except BaseException:
         video.release()
@@ -65,11 +65,11 @@ def open_video(settings: V4l2Settings, control: int, who: str) -> tuple[VideoCap
     return video, stream
 
 
-def _set_picture(video: VideoCapture, settings: V4l2Settings) -> None:
+def _set_format(video: VideoCapture, settings: V4l2Settings) -> None:
     import cv2
 
     video.set(cv2.CAP_PROP_CONVERT_RGB, 0)
-    video.set(cv2.CAP_PROP_FOURCC, v4l2.fourcc(settings.pixel_format))
+    video.set(cv2.CAP_PROP_FOURCC, ioctl.fourcc(settings.pixel_format))
     video.set(cv2.CAP_PROP_FRAME_WIDTH, settings.width_px)
     video.set(cv2.CAP_PROP_FRAME_HEIGHT, settings.height_px)
     if settings.frames_per_s is not None:
@@ -77,12 +77,12 @@ def _set_picture(video: VideoCapture, settings: V4l2Settings) -> None:
     video.set(cv2.CAP_PROP_BUFFERSIZE, settings.buffers)
 
 
-def _check_picture(video: VideoCapture, settings: V4l2Settings, control: int, who: str) -> None:
+def _check_format(video: VideoCapture, settings: V4l2Settings, control: int, who: str) -> None:
     import cv2
 
-    found = v4l2.current_format(control)
+    found = ioctl.current_format(control)
     if found.name != settings.pixel_format:
-        offered = ", ".join(v4l2.formats(control))
+        offered = ", ".join(ioctl.formats(control))
         raise DeviceError(
             f"{who}: format {settings.pixel_format} asked for, the camera took {found.name}; "
             f"it offers {offered}; change pixel_format"
@@ -95,9 +95,9 @@ def _check_picture(video: VideoCapture, settings: V4l2Settings, control: int, wh
     _check_rate(settings, control, who)
 
 
-def _check_size(found: v4l2.Format, settings: V4l2Settings, control: int, who: str) -> None:
+def _check_size(found: ioctl.Format, settings: V4l2Settings, control: int, who: str) -> None:
     if (found.width_px, found.height_px) != (settings.width_px, settings.height_px):
-        offered = ", ".join(v4l2.sizes(control, found.name))
+        offered = ", ".join(ioctl.sizes(control, found.name))
         raise DeviceError(
             f"{who}: size {settings.width_px} x {settings.height_px} pixels asked for, the camera "
             f"took {found.width_px} x {found.height_px}; it offers {offered}; "
@@ -106,12 +106,12 @@ def _check_size(found: v4l2.Format, settings: V4l2Settings, control: int, who: s
     if found.bytes_per_line != settings.bytes_per_line:
         raise DeviceError(
             f"{who}: a row has {found.bytes_per_line} bytes, {settings.bytes_per_line} of them "
-            "pixels: OpenCV would shear the picture; choose another width_px"
+            "pixels: OpenCV would shear the image; choose another width_px"
         )
 
 
 def _check_rate(settings: V4l2Settings, control: int, who: str) -> None:
-    asked, period_s = settings.frames_per_s, v4l2.frame_period_s(control)
+    asked, period_s = settings.frames_per_s, ioctl.frame_period_s(control)
     if asked is not None and period_s is not None and period_s > 1.01 / asked:
         raise DeviceError(
             f"{who}: {asked} frames a second asked for, the camera took {1 / period_s:g}; "
@@ -121,24 +121,24 @@ def _check_rate(settings: V4l2Settings, control: int, who: str) -> None:
 
 def _check_buffers(video: VideoCapture, stream: int | None, who: str) -> None:
     count = buffer_count(video)
-    given = count if stream is None else _buffers_given(stream, count)
-    if given < _LEAST_BUFFERS:
+    given = count if stream is None else _usable_buffers(stream, count)
+    if given < _MIN_BUFFERS:
         raise CameraLost(
-            f"{who}: gave {given} buffers, at least {_LEAST_BUFFERS} are needed; look whether "
+            f"{who}: gave {given} buffers, at least {_MIN_BUFFERS} are needed; look whether "
             "another program uses the camera, or plug it in anew"
         )
 
 
 def buffer_count(video: VideoCapture) -> int:
-    """How many buffers OpenCV has of the camera."""
+    """Return the number of buffers that OpenCV has of the camera."""
     import cv2
 
     return int(video.get(cv2.CAP_PROP_BUFFERSIZE))
 
 
-def _buffers_given(stream: int, count: int) -> int:
+def _usable_buffers(stream: int, count: int) -> int:
     try:
-        return len([v4l2.buffer_state(stream, index) for index in range(count)])
+        return len([ioctl.buffer_state(stream, index) for index in range(count)])
     except OSError:
         return 0
 
@@ -148,14 +148,14 @@ def _descriptors() -> set[int]:
 
 
 def _stream_descriptor(before: set[int], control: int) -> int | None:
-    """The descriptor on which this camera answers, best one that came with the opening.
+    """Return the descriptor on which this camera answers; those that are new come first.
 
-    A number from before may have been closed by another thread and used anew.
+    Another thread may have closed a descriptor meanwhile, and OpenCV been given its number.
     """
-    camera = v4l2.capability(control)
-    for descriptor in sorted(_descriptors() - {control}, key=lambda one: one in before):
+    camera = ioctl.capability(control)
+    for descriptor in sorted(_descriptors() - {control}, key=lambda number: number in before):
         try:
-            if v4l2.capability(descriptor) == camera:
+            if ioctl.capability(descriptor) == camera:
                 return descriptor
         except OSError:
             continue  # another file of this process

@@ -1,4 +1,4 @@
-"""What a V4L2 camera is to be set to, and how exposures are counted: in steps of 100 µs."""
+"""Settings of a V4L2 camera, and its exposure in steps of 100 µs."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _DEPTHS = {"GREY": (8, 8), "YUYV": (8, 8), "Y10": (10, 10), "Y16": (9, 16)}
 _BUFFERS = (2, 10)  # one is read while another fills; OpenCV has room for ten
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class V4l2Settings:
-    """A camera by its device path, best one of /dev/v4l/by-id, and all that it is set to.
+    """Device path of a camera, preferably of /dev/v4l/by-id, and its settings.
 
-    `gain` None leaves the gain alone (an automatic gain is switched off all the same);
-    `frames_per_s` None leaves the rate at what the camera makes of OpenCV's 30 a second.
-    `exposure_delay_frames`: how many frames late a new exposure may reach the sensor.
+    `gain` None leaves the gain as it is (an automatic gain is switched off all the same).
+    `frames_per_s` None leaves the rate that the camera chooses for OpenCV's default, 30 per second.
+    A new exposure may take effect `exposure_delay_frames` frames late.
     """
 
     device: str
@@ -50,23 +50,23 @@ class V4l2Settings:
 
     @property
     def bytes_per_line(self) -> int:
-        """Bytes of one row of pixels."""
+        """Bytes per row of pixels."""
         return self.width_px * (1 if self.pixel_format == "GREY" else 2)
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the array that OpenCV hands out."""
+        """Shape of the array returned by OpenCV."""
         size = (self.height_px, self.width_px)
         return (*size, 2) if self.pixel_format == "YUYV" else size
 
     @property
     def checked_max_dn(self) -> int | None:
-        """The greatest count that a pixel can have, where the sample has room for more."""
+        """Largest possible count of a pixel; None if the pixel format cannot hold a larger one."""
         room = 8 if self.pixel_format in ("GREY", "YUYV") else 16
         return 2**self.bit_depth - 1 if self.bit_depth < room else None
 
     def exposure_steps(self, exposure_s: float) -> int:
-        """An exposure in steps of 100 µs; refused outside the range and between two steps."""
+        """Convert an exposure to steps of 100 µs; refuse one out of range or between two steps."""
         low, high = self.min_exposure_s, self.max_exposure_s
         if not low <= exposure_s <= high:
             raise DeviceError(

@@ -1,6 +1,6 @@
-"""A thread of its own for calls that may block in a driver, so that the caller never does.
+"""Worker thread for calls that may block in a device driver, so that the caller never does.
 
-The caller waits in short turns: Ctrl-C still reaches it, and a driver that hangs is left behind.
+The caller waits in short intervals: Ctrl-C still reaches it, and a hung driver is left behind.
 """
 
 from __future__ import annotations
@@ -14,46 +14,46 @@ from typing import TypeVar
 from instrument.clock import Clock
 
 Result = TypeVar("Result")
-_GLANCE_S = 0.1  # how often the caller looks whether the thread still shows life
+_CHECK_S = 0.1  # interval at which the caller checks the heartbeat
 
 
 class Cancelled(Exception):
-    """Nobody waits for this answer any more."""
+    """Nobody waits for this result any more."""
 
 
 class Hung(Exception):
-    """The thread has shown no life for too long; the caller goes on without an answer."""
+    """The job has not beaten its heart for too long; the caller goes on without a result."""
 
 
 class Heartbeat:
-    """What a job and its caller tell each other: still alive, still wanted."""
+    """Signals between a job and its caller: the job is alive, its result is still wanted."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock, self._beat_s = clock, clock.now_s()
         self._cancelled = threading.Event()
 
     @property
-    def quiet_s(self) -> float:
-        """How long ago the job last showed life."""
+    def silent_s(self) -> float:
+        """Seconds since the last beat."""
         return self._clock.now_s() - self._beat_s
 
     def beat(self) -> None:
-        """Show life; raise `Cancelled` when the answer is no longer wanted."""
+        """Report progress; raise `Cancelled` if the result is no longer wanted."""
         self._beat_s = self._clock.now_s()
         self.check()
 
     def check(self) -> None:
-        """Raise `Cancelled` when the answer is no longer wanted."""
+        """Raise `Cancelled` if the result is no longer wanted."""
         if self._cancelled.is_set():
             raise Cancelled
 
     def cancel(self) -> None:
-        """The answer is no longer wanted."""
+        """Tell the job that its result is no longer wanted."""
         self._cancelled.set()
 
 
-class Reader:
-    """The thread: does one job after the other until it is told to end."""
+class WorkerThread:
+    """Thread that does one job after another until it is told to end."""
 
     def __init__(self, name: str, clock: Clock) -> None:
         self._clock = clock
@@ -63,32 +63,32 @@ class Reader:
     def _work(self) -> None:
         while (job := self._jobs.get()) is not None:
             job()
-            del job  # its result is the caller's
+            del job  # its result belongs to the caller
 
-    def call(self, action: Callable[[Heartbeat], Result], quiet_s: float) -> Result:
-        """Have `action` done and return its result, or raise what it raised.
+    def call(self, action: Callable[[Heartbeat], Result], max_silent_s: float) -> Result:
+        """Run `action` and return its result, or raise its error.
 
-        `Hung` is raised when the job shows no life for `quiet_s`.
+        Raises `Hung` if the job has no heartbeat for `max_silent_s`.
         """
-        life = Heartbeat(self._clock)
-        future = self.post(lambda: action(life))
+        heartbeat = Heartbeat(self._clock)
+        future = self.post(lambda: action(heartbeat))
         try:
-            while not wait((future,), _GLANCE_S).done:
-                if life.quiet_s > quiet_s:
+            while not wait((future,), _CHECK_S).done:
+                if heartbeat.silent_s > max_silent_s:
                     raise Hung
         except BaseException:
-            life.cancel()
+            heartbeat.cancel()
             raise
         return future.result()
 
     def post(self, action: Callable[[], Result]) -> Future[Result]:
-        """Have `action` done when its turn comes."""
+        """Queue `action` and return at once."""
         future: Future[Result] = Future()
         self._jobs.put(lambda: _run(action, future))
         return future
 
     def end(self) -> None:
-        """End the thread once it has done what is waiting; returns at once."""
+        """End the thread after the queued jobs; return at once."""
         self._jobs.put(None)
 
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.v4l2.camera import V4l2Camera, V4l2Settings
+from drivers.v4l2.camera import V4l2Camera
 from instrument.clock import SystemClock
 from instrument.config.load import load_protocol
 from instrument.devices import Camera
@@ -45,7 +45,10 @@ def camera(
         if not request.config.getoption("--camera"):
             pytest.skip("no real camera: --allow-motion --camera /dev/v4l/by-id/...")
         device = request.config.getoption("--camera")
-        settings = V4l2Settings(device, "YUYV", 640, 480, 8, 0.001, 0.1)
+        settings = replace(
+            SETTINGS, device=device, pixel_format="YUYV", width_px=640, height_px=480, bit_depth=8,
+            max_exposure_s=0.1, gain=None,
+        )  # fmt: skip
         with V4l2Camera(settings, SystemClock()) as real:
             yield real
 

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.v4l2 import ioctl as v4l2
+from drivers.v4l2 import ioctl
 
 PixelFormat = Literal["GREY", "Y10", "Y16", "YUYV"]
 BYTES_PER_PIXEL: Mapping[PixelFormat, int] = {"GREY": 1, "Y10": 2, "Y16": 2, "YUYV": 2}
@@ -92,15 +92,15 @@ class Refused(Exception):
         self.number = number
 
 
-def _standard_controls() -> list[v4l2.Control]:
+def _standard_controls() -> list[ioctl.Control]:
     return [
-        v4l2.Control(v4l2.AUTO_WHITE_BALANCE, "White Balance, Automatic", "on/off", 0, 1, 1, 1),
-        v4l2.Control(v4l2.GAMMA, "Gamma", "integer", 72, 500, 1, 220),
-        v4l2.Control(v4l2.AUTOGAIN, "Gain, Automatic", "on/off", 0, 1, 1, 1),
-        v4l2.Control(v4l2.GAIN, "Gain", "integer", 0, 480, 10, 100),
-        v4l2.Control(v4l2.EXPOSURE_AUTO, "Auto Exposure", "menu", 0, 3, 1, 3),
-        v4l2.Control(
-            v4l2.EXPOSURE_ABSOLUTE, "Exposure Time, Absolute", "integer", 1, 100_000, 1, 157
+        ioctl.Control(ioctl.AUTO_WHITE_BALANCE, "White Balance, Automatic", "on/off", 0, 1, 1, 1),
+        ioctl.Control(ioctl.GAMMA, "Gamma", "integer", 72, 500, 1, 220),
+        ioctl.Control(ioctl.AUTOGAIN, "Gain, Automatic", "on/off", 0, 1, 1, 1),
+        ioctl.Control(ioctl.GAIN, "Gain", "integer", 0, 480, 10, 100),
+        ioctl.Control(ioctl.EXPOSURE_AUTO, "Auto Exposure", "menu", 0, 3, 1, 3),
+        ioctl.Control(
+            ioctl.EXPOSURE_ABSOLUTE, "Exposure Time, Absolute", "integer", 1, 100_000, 1, 157
         ),
     ]
 
@@ -171,7 +171,7 @@ class EmulatedCamera:
 
     # Controls
 
-    def controls(self, *, current: bool = True) -> Mapping[int, v4l2.Control]:
+    def controls(self, *, current: bool = True) -> Mapping[int, ioctl.Control]:
         """Return the controls by number, with their current or default values."""
         if not current:
             return self._controls
@@ -191,35 +191,35 @@ class EmulatedCamera:
         if number in self.faults.refused_controls or self._is_automatic(number):
             raise Refused(errno.EACCES)
         if number not in self.faults.stuck_controls:
-            steps = min(max(value, control.least), control.greatest) - control.least
-            self._values[number] = control.least + steps // control.step * control.step
+            steps = min(max(value, control.minimum), control.maximum) - control.minimum
+            self._values[number] = control.minimum + steps // control.step * control.step
             self._clamp_exposure()
         return self._values[number]
 
     def _is_automatic(self, number: int) -> bool:
         """True for the exposure while auto-exposure is on: it cannot be set then."""
-        automatic = self._values.get(v4l2.EXPOSURE_AUTO, _MANUAL) != _MANUAL
-        return number == v4l2.EXPOSURE_ABSOLUTE and automatic
+        automatic = self._values.get(ioctl.EXPOSURE_AUTO, _MANUAL) != _MANUAL
+        return number == ioctl.EXPOSURE_ABSOLUTE and automatic
 
     def _clamp_exposure(self) -> None:
         clamp = self.faults.clamped_exposure
         if clamp is not None:
-            exposure = self._values[v4l2.EXPOSURE_ABSOLUTE]
-            self._values[v4l2.EXPOSURE_ABSOLUTE] = min(exposure, clamp)
+            exposure = self._values[ioctl.EXPOSURE_ABSOLUTE]
+            self._values[ioctl.EXPOSURE_ABSOLUTE] = min(exposure, clamp)
 
     @property
     def exposure_s(self) -> float:
         """Present exposure time in seconds."""
-        return self._values[v4l2.EXPOSURE_ABSOLUTE] * 1e-4
+        return self._values[ioctl.EXPOSURE_ABSOLUTE] * 1e-4
 
     @property
     def gain(self) -> int:
         """Present gain; 0 if the camera has no such control."""
-        return self._values.get(v4l2.GAIN, 0)
+        return self._values.get(ioctl.GAIN, 0)
 
     # Format and frames
 
-    def nearest_format(self, name: str, width: int, height: int) -> v4l2.Format:
+    def nearest_format(self, name: str, width: int, height: int) -> ioctl.Format:
         """Return the supported format nearest to the requested one, as drivers adjust it."""
         faults, formats = self.faults, self.capabilities.formats
         chosen = next((f for f in formats if f == name), formats[0])
@@ -227,18 +227,18 @@ class EmulatedCamera:
         size = min(self.capabilities.sizes, key=lambda s: abs(s[0] - width) + abs(s[1] - height))
         return self._format(chosen, faults.substitute_size or size)
 
-    def set_format(self, chosen: v4l2.Format) -> None:
+    def set_format(self, chosen: ioctl.Format) -> None:
         """Use this format from now on."""
         self.pixel_format = next(f for f in BYTES_PER_PIXEL if f == chosen.name)
         self.size = (chosen.width_px, chosen.height_px)
 
-    def format(self) -> v4l2.Format:
+    def format(self) -> ioctl.Format:
         """Return the present format."""
         return self._format(self.pixel_format, self.size)
 
-    def _format(self, name: PixelFormat, size: tuple[int, int]) -> v4l2.Format:
+    def _format(self, name: PixelFormat, size: tuple[int, int]) -> ioctl.Format:
         per_line = size[0] * BYTES_PER_PIXEL[name] + self.capabilities.row_padding_bytes
-        return v4l2.Format(name, *size, per_line, per_line * size[1])
+        return ioctl.Format(name, *size, per_line, per_line * size[1])
 
     def frame_bytes(self, exposure: Exposure, snapshot: object) -> NDArray[np.uint8]:
         """Render a frame; return its bytes in the exposure's pixel format, shape (bytes,)."""

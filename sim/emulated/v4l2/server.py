@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from struct import Struct
 
-from drivers.v4l2 import ioctl as v4l2
+from drivers.v4l2 import ioctl
 from instrument.closeable import Closing
 from sim.emulated.v4l2.device import EmulatedCamera, Refused
 from sim.emulated.v4l2.stream import Stream
@@ -20,7 +20,7 @@ _CAPTURE_AND_STREAMING = 0x04200001  # V4L2_CAP_VIDEO_CAPTURE, _EXT_PIX_FORMAT, 
 _DEVICE_CAPS = 0x80000000
 _TIME_PER_FRAME = 0x1000  # V4L2_CAP_TIMEPERFRAME
 _NEXT = 0x80000000
-_KIND_NUMBERS = {name: number for number, name in reversed(v4l2.KINDS.items())}
+_KIND_NUMBERS = {name: number for number, name in reversed(ioctl.KINDS.items())}
 
 
 class V4l2Server(Closing):
@@ -80,25 +80,25 @@ class _Descriptor:
         self._stream = Stream(camera)
         self._times_unplugged = camera.times_unplugged
         self._handlers: dict[int, tuple[str, Callable[[bytes], bytes]]] = {
-            v4l2.QUERYCAP: ("QUERYCAP", self._capability),
-            v4l2.ENUM_FMT: ("ENUM_FMT", self._list_format),
-            v4l2.ENUM_FRAMESIZES: ("ENUM_FRAMESIZES", self._list_size),
-            v4l2.G_FMT: ("G_FMT", self._format),
-            v4l2.S_FMT: ("S_FMT", self._set_format),
-            v4l2.TRY_FMT: ("TRY_FMT", self._try_format),
-            v4l2.REQBUFS: ("REQBUFS", self._request_buffers),
-            v4l2.QUERYBUF: ("QUERYBUF", self._query_buffer),
-            v4l2.QBUF: ("QBUF", self._queue),
-            v4l2.DQBUF: ("DQBUF", lambda _: self._stream.dequeue()),
-            v4l2.STREAMON: ("STREAMON", self._start),
-            v4l2.STREAMOFF: ("STREAMOFF", self._stop),
-            v4l2.G_PARM: ("G_PARM", self._rate),
-            v4l2.S_PARM: ("S_PARM", self._rate),
-            v4l2.G_CTRL: ("G_CTRL", self._control),
-            v4l2.S_CTRL: ("S_CTRL", self._set_control),
-            v4l2.QUERYCTRL: ("QUERYCTRL", self._query_control),
-            v4l2.G_INPUT: ("G_INPUT", lambda _: bytes(4)),
-            v4l2.S_INPUT: ("S_INPUT", self._set_input),
+            ioctl.QUERYCAP: ("QUERYCAP", self._capability),
+            ioctl.ENUM_FMT: ("ENUM_FMT", self._list_format),
+            ioctl.ENUM_FRAMESIZES: ("ENUM_FRAMESIZES", self._list_size),
+            ioctl.G_FMT: ("G_FMT", self._format),
+            ioctl.S_FMT: ("S_FMT", self._set_format),
+            ioctl.TRY_FMT: ("TRY_FMT", self._try_format),
+            ioctl.REQBUFS: ("REQBUFS", self._request_buffers),
+            ioctl.QUERYBUF: ("QUERYBUF", self._query_buffer),
+            ioctl.QBUF: ("QBUF", self._queue),
+            ioctl.DQBUF: ("DQBUF", lambda _: self._stream.dequeue()),
+            ioctl.STREAMON: ("STREAMON", self._start),
+            ioctl.STREAMOFF: ("STREAMOFF", self._stop),
+            ioctl.G_PARM: ("G_PARM", self._rate),
+            ioctl.S_PARM: ("S_PARM", self._rate),
+            ioctl.G_CTRL: ("G_CTRL", self._control),
+            ioctl.S_CTRL: ("S_CTRL", self._set_control),
+            ioctl.QUERYCTRL: ("QUERYCTRL", self._query_control),
+            ioctl.G_INPUT: ("G_INPUT", lambda _: bytes(4)),
+            ioctl.S_INPUT: ("S_INPUT", self._set_input),
         }
 
     def serve(self) -> None:
@@ -125,25 +125,25 @@ class _Descriptor:
     def _capability(self, _: bytes) -> bytes:
         card = self._camera.capabilities.card.encode()
         capabilities = (_DEVICE_CAPS | _CAPTURE_AND_STREAMING, _CAPTURE_AND_STREAMING)
-        return v4l2.CAPABILITY_STRUCT.pack(
+        return ioctl.CAPABILITY_STRUCT.pack(
             b"emulated", card, b"platform:emulated-0", 6 << 16, *capabilities
         )
 
     def _list_format(self, argument: bytes) -> bytes:
-        index, kind, *_ = v4l2.FMTDESC_STRUCT.unpack(argument)
+        index, kind, *_ = ioctl.FMTDESC_STRUCT.unpack(argument)
         formats = self._camera.capabilities.formats
-        _require(kind == v4l2.CAPTURE and index < len(formats))
+        _require(kind == ioctl.CAPTURE and index < len(formats))
         name = formats[index]
-        return v4l2.FMTDESC_STRUCT.pack(index, kind, 0, name.encode(), v4l2.fourcc(name))
+        return ioctl.FMTDESC_STRUCT.pack(index, kind, 0, name.encode(), ioctl.fourcc(name))
 
     def _list_size(self, argument: bytes) -> bytes:
-        index, number, *_ = v4l2.FRAMESIZE_STRUCT.unpack(argument)
+        index, number, *_ = ioctl.FRAMESIZE_STRUCT.unpack(argument)
         sizes = self._camera.capabilities.sizes
         _require(index < len(sizes))
-        return v4l2.FRAMESIZE_STRUCT.pack(index, number, v4l2.DISCRETE, *sizes[index], *[0] * 4)
+        return ioctl.FRAMESIZE_STRUCT.pack(index, number, ioctl.DISCRETE, *sizes[index], *[0] * 4)
 
     def _format(self, argument: bytes) -> bytes:
-        _require(argument[:4] == v4l2.CAPTURE.to_bytes(4, "little"))
+        _require(argument[:4] == ioctl.CAPTURE.to_bytes(4, "little"))
         return _pack_format(self._camera.format())
 
     def _try_format(self, argument: bytes) -> bytes:
@@ -155,16 +155,16 @@ class _Descriptor:
         self._camera.set_format(chosen)
         return _pack_format(chosen)
 
-    def _nearest_format(self, argument: bytes) -> v4l2.Format:
-        kind, width, height, number, *_ = v4l2.FORMAT_STRUCT.unpack(argument)
-        _require(kind == v4l2.CAPTURE)
-        return self._camera.nearest_format(v4l2.fourcc_name(number), width, height)
+    def _nearest_format(self, argument: bytes) -> ioctl.Format:
+        kind, width, height, number, *_ = ioctl.FORMAT_STRUCT.unpack(argument)
+        _require(kind == ioctl.CAPTURE)
+        return self._camera.nearest_format(ioctl.fourcc_name(number), width, height)
 
     def _request_buffers(self, argument: bytes) -> bytes:
-        count, kind, memory, _ = v4l2.REQBUFS_STRUCT.unpack(argument)
-        _require(kind == v4l2.CAPTURE and memory == v4l2.MMAP)
+        count, kind, memory, _ = ioctl.REQBUFS_STRUCT.unpack(argument)
+        _require(kind == ioctl.CAPTURE and memory == ioctl.MMAP)
         granted = self._stream.request_buffers(count)
-        return v4l2.REQBUFS_STRUCT.pack(granted, kind, memory, 1)
+        return ioctl.REQBUFS_STRUCT.pack(granted, kind, memory, 1)
 
     def _query_buffer(self, argument: bytes) -> bytes:
         return self._stream.query(_buffer_index(argument))
@@ -183,26 +183,26 @@ class _Descriptor:
     def _rate(self, _: bytes) -> bytes:
         """Return the only frame rate, whatever was requested."""
         frames_per_s = self._camera.capabilities.frames_per_s
-        return v4l2.PARM_STRUCT.pack(v4l2.CAPTURE, _TIME_PER_FRAME, 0, 1, frames_per_s)
+        return ioctl.PARM_STRUCT.pack(ioctl.CAPTURE, _TIME_PER_FRAME, 0, 1, frames_per_s)
 
     def _control(self, argument: bytes) -> bytes:
-        number, _ = v4l2.CONTROL_STRUCT.unpack(argument)
-        return v4l2.CONTROL_STRUCT.pack(number, self._camera.value(number))
+        number, _ = ioctl.CONTROL_STRUCT.unpack(argument)
+        return ioctl.CONTROL_STRUCT.pack(number, self._camera.value(number))
 
     def _set_control(self, argument: bytes) -> bytes:
-        number, value = v4l2.CONTROL_STRUCT.unpack(argument)
-        return v4l2.CONTROL_STRUCT.pack(number, self._camera.set_value(number, value))
+        number, value = ioctl.CONTROL_STRUCT.unpack(argument)
+        return ioctl.CONTROL_STRUCT.pack(number, self._camera.set_value(number, value))
 
     def _query_control(self, argument: bytes) -> bytes:
-        number = v4l2.QUERYCTRL_STRUCT.unpack(argument)[0]
+        number = ioctl.QUERYCTRL_STRUCT.unpack(argument)[0]
         controls = self._camera.controls(current=False)
         if number & _NEXT:
             number = min((n for n in controls if n > number & ~_NEXT), default=0)
         _require(number in controls)
         control = controls[number]
-        limits = (control.least, control.greatest, control.step, control.default)
+        limits = (control.minimum, control.maximum, control.step, control.default)
         kind = _KIND_NUMBERS[control.kind]
-        return v4l2.QUERYCTRL_STRUCT.pack(number, kind, control.name.encode(), *limits, 0)
+        return ioctl.QUERYCTRL_STRUCT.pack(number, kind, control.name.encode(), *limits, 0)
 
     def _set_input(self, argument: bytes) -> bytes:
         _require(argument == bytes(4))
@@ -219,17 +219,17 @@ def _refuse(_: bytes) -> bytes:
 
 
 def _buffer_index(argument: bytes) -> int:
-    index, kind, *_ = v4l2.BUFFER_STRUCT.unpack(argument)
-    _require(kind == v4l2.CAPTURE)
+    index, kind, *_ = ioctl.BUFFER_STRUCT.unpack(argument)
+    _require(kind == ioctl.CAPTURE)
     return int(index)
 
 
-def _pack_format(chosen: v4l2.Format) -> bytes:
-    return v4l2.FORMAT_STRUCT.pack(
-        v4l2.CAPTURE,
+def _pack_format(chosen: ioctl.Format) -> bytes:
+    return ioctl.FORMAT_STRUCT.pack(
+        ioctl.CAPTURE,
         chosen.width_px,
         chosen.height_px,
-        v4l2.fourcc(chosen.name),
+        ioctl.fourcc(chosen.name),
         1,
         chosen.bytes_per_line,
         chosen.bytes_total,

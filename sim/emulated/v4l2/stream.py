@@ -10,7 +10,7 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
-from drivers.v4l2 import ioctl as v4l2
+from drivers.v4l2 import ioctl
 from sim.emulated.v4l2.device import EmulatedCamera, Exposure, Refused
 
 _MAX_BUFFERS = 32
@@ -107,7 +107,7 @@ class Stream:
             buffer = self._buffer(index)
             if buffer.state:
                 raise Refused(errno.EINVAL)
-            self._buffers[index] = _Buffer(state=v4l2.BUFFER_QUEUED)
+            self._buffers[index] = _Buffer(state=ioctl.BUFFER_QUEUED)
             self._queued.append(index)
             return self._pack(index)
 
@@ -165,13 +165,13 @@ class Stream:
     def _pack_as(self, index: int, buffer: _Buffer) -> bytes:
         self._buffer(index)
         flags = _MONOTONIC | buffer.state
-        if buffer.state == v4l2.BUFFER_DONE and buffer.bad:
-            flags |= v4l2.BUFFER_ERROR
+        if buffer.state == ioctl.BUFFER_DONE and buffer.bad:
+            flags |= ioctl.BUFFER_ERROR
         seconds, microseconds = divmod(int(buffer.time_s * 1e6), 1_000_000)
         stamp = (seconds, microseconds, buffer.sequence)
-        location = (v4l2.MMAP, index * self._length, self._length)
-        return v4l2.BUFFER_STRUCT.pack(
-            index, v4l2.CAPTURE, buffer.bytes_used, flags, 1, *stamp, *location
+        location = (ioctl.MMAP, index * self._length, self._length)
+        return ioctl.BUFFER_STRUCT.pack(
+            index, ioctl.CAPTURE, buffer.bytes_used, flags, 1, *stamp, *location
         )
 
     # The sensor
@@ -209,7 +209,7 @@ class Stream:
                 return
             index = self._queued.popleft()
             buffer = self._buffers[index]
-            buffer.state = v4l2.BUFFER_DONE
+            buffer.state = ioctl.BUFFER_DONE
             buffer.bytes_used = self._camera.format().bytes_total
             buffer.time_s = end_s + self._camera.capabilities.stamp_offset_s
             buffer.sequence, buffer.frame = exposure.sequence, (exposure, snapshot)

@@ -212,7 +212,7 @@ def test_a_reference_that_is_not_found_is_an_error_and_a_stop() -> None:
 
 def test_a_drive_that_is_not_ready_takes_no_move(at: EmulatedDrive) -> None:
     stage = at.homed()
-    at.drive._free = True  # its FREE input: the motor is without current
+    at.drive.serve(bytes.fromhex("06 007D 0040"))  # FREE: the motor is without current
     with pytest.raises(DeviceError, match=r"not ready to move .* STOP and FREE"):
         stage.start_move(1.0)
     assert at.drive.triggers == 0

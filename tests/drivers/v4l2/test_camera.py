@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.v4l2 import ioctl as v4l2_ioctl
+from drivers.v4l2 import ioctl
 from drivers.v4l2.listing import video_devices
 from drivers.v4l2.settings import PixelFormat, V4l2Settings
 from instrument.errors import DeviceError
@@ -52,23 +52,23 @@ def test_nothing_is_left_automatic(remote: RemoteCamera, bench: Bench) -> None:
         remote.ask("open", SETTINGS)
         standing = {c.number: c.value for c in camera.controls().values()}
     assert standing == {
-        v4l2_ioctl.EXPOSURE_AUTO: 1,
-        v4l2_ioctl.AUTOGAIN: 0,
-        v4l2_ioctl.AUTO_WHITE_BALANCE: 0,
-        v4l2_ioctl.GAMMA: 100,
-        v4l2_ioctl.GAIN: 100,
-        v4l2_ioctl.EXPOSURE_ABSOLUTE: 10,
+        ioctl.EXPOSURE_AUTO: 1,
+        ioctl.AUTOGAIN: 0,
+        ioctl.AUTO_WHITE_BALANCE: 0,
+        ioctl.GAMMA: 100,
+        ioctl.GAIN: 100,
+        ioctl.EXPOSURE_ABSOLUTE: 10,
     }
 
 
 def test_a_camera_without_automatics_needs_none(remote: RemoteCamera, bench: Bench) -> None:
     spare = frozenset(
         {
-            v4l2_ioctl.EXPOSURE_AUTO,
-            v4l2_ioctl.AUTOGAIN,
-            v4l2_ioctl.AUTO_WHITE_BALANCE,
-            v4l2_ioctl.GAMMA,
-            v4l2_ioctl.GAIN,
+            ioctl.EXPOSURE_AUTO,
+            ioctl.AUTOGAIN,
+            ioctl.AUTO_WHITE_BALANCE,
+            ioctl.GAMMA,
+            ioctl.GAIN,
         }
     )
     with served(remote, bench, without_controls=spare):
@@ -211,14 +211,14 @@ def test_stamps_of_another_clock(remote: RemoteCamera, bench: Bench) -> None:
 
 def test_a_driver_that_does_not_tell_of_torn_frames(remote: RemoteCamera, bench: Bench) -> None:
     with served(remote, bench, reports_filled=False):
-        assert "does not tell of torn frames" in remote.ask("open", SETTINGS)
+        assert "does not report torn frames" in remote.ask("open", SETTINGS)
         bench.level = 3
         assert [level(frame) for frame in remote.grab(3)] == [3, 3, 3]
 
 
 def test_a_stream_whose_descriptor_is_not_found(remote: RemoteCamera, bench: Bench) -> None:
     with served(remote, bench):
-        assert "does not tell of torn frames" in remote.ask("open_blind", SETTINGS)
+        assert "does not report torn frames" in remote.ask("open_blind", SETTINGS)
         bench.level = 3
         assert [level(frame) for frame in remote.grab(3)] == [3, 3, 3]
 
@@ -238,7 +238,7 @@ def test_description_without_a_stream(remote: RemoteCamera, bench: Bench) -> Non
     assert found.formats[2].sizes == ("640 x 480", "512 x 480", "64 x 48")
     assert (found.current.name, found.current.width_px) == ("GREY", 640)
     gain = next(one for one in found.controls if one.name == "Gain")
-    assert (gain.least, gain.greatest, gain.step, gain.value) == (0, 480, 10, 100)
+    assert (gain.minimum, gain.maximum, gain.step, gain.value) == (0, 480, 10, 100)
     assert len(found.controls) == 6
 
 
@@ -299,6 +299,9 @@ def test_without_a_compiler_the_emulated_camera_says_so(
 
 
 def test_settings_are_what_the_rig_file_will_hold() -> None:
-    least = V4l2Settings(DEVICE, "GREY", 512, 480, 8, 0.0001, 1.0)
+    least = V4l2Settings(
+        device=DEVICE, pixel_format="GREY", width_px=512, height_px=480, bit_depth=8,
+        min_exposure_s=0.0001, max_exposure_s=1.0,
+    )  # fmt: skip
     assert (least.gain, least.buffers, least.exposure_delay_frames) == (None, 4, 2)
     assert QUICK.frames_per_s == 200

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.v4l2 import ioctl as v4l2
+from drivers.v4l2 import ioctl
 from instrument.errors import DeviceError
 from sim.emulated.v4l2.device import EmulatedCamera, Exposure
 from tests.support.v4l2.remote_camera import (
@@ -89,12 +89,12 @@ def test_a_camera_plugged_in_again_is_set_as_before(remote: RemoteCamera, bench:
         with pytest.raises(DeviceError, match="is gone"):
             remote.grab(1)
         camera.replug()
-        assert camera.value(v4l2.GAIN) == 100
-        assert camera.value(v4l2.EXPOSURE_AUTO) == 3
+        assert camera.value(ioctl.GAIN) == 100
+        assert camera.value(ioctl.EXPOSURE_AUTO) == 3
         bench.level = 5
         frames = remote.grab(3)
         assert [(level(frame), steps(frame)) for frame in frames] == [(5, 77)] * 3
-        assert camera.value(v4l2.EXPOSURE_AUTO) == 1
+        assert camera.value(ioctl.EXPOSURE_AUTO) == 1
         assert (camera.pixel_format, camera.size) == ("Y16", (64, 48))
 
 
@@ -149,7 +149,7 @@ def test_settings_are_verified_again_after_the_camera_was_lost(
         with pytest.raises(DeviceError, match="is gone"):
             remote.grab(1)
         camera.replug()
-        camera.faults.stuck_controls.add(v4l2.EXPOSURE_AUTO)
+        camera.faults.stuck_controls.add(ioctl.EXPOSURE_AUTO)
         with pytest.raises(DeviceError, match="manual exposure"):
             remote.grab(1)
         camera.faults.stuck_controls.clear()

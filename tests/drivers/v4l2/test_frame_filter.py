@@ -46,45 +46,45 @@ def test_what_counts_began_after_the_call_at_the_new_exposure(
     delay_frames: int,
     stamp_at_end: bool,
 ) -> None:
-    gate = FrameFilter(old_s, overhead_s, delay_frames, None)
+    frame_filter = FrameFilter(old_s, overhead_s, delay_frames, None)
     frames = sensor([(-9.0, old_s), (changed_s, new_s)], overhead_s, -3.0, delay_frames)
     called_s = changed_s + waited_s
-    gate.exposure_changed(changed_s, new_s)
-    gate.call(called_s)
-    longest_s = gate.longest_exposure_s
+    frame_filter.exposure_changed(changed_s, new_s)
+    frame_filter.request(called_s)
+    longest_s = frame_filter.longest_exposure_s
     assert longest_s == max(old_s, new_s)
     for start_s, exposure_s in frames:
         stamp_s = start_s + (exposure_s + overhead_s if stamp_at_end else 0.0)
-        if gate.admits(stamp_s):
+        if frame_filter.accepts(stamp_s):
             assert start_s >= called_s - 1e-9
             assert exposure_s == new_s
-            assert gate.longest_exposure_s == new_s
+            assert frame_filter.longest_exposure_s == new_s
 
 
 def test_frames_are_not_thrown_away_without_need() -> None:
     """A steady camera, stamps at the end: at most two frames beyond the first that began later."""
-    gate = FrameFilter(0.01, 0.03, 2, None)
-    gate.call(0.0)
-    stamps = [gate.admits(0.03 * n + 0.005) for n in range(10)]
+    frame_filter = FrameFilter(0.01, 0.03, 2, None)
+    frame_filter.request(0.0)
+    stamps = [frame_filter.accepts(0.03 * n + 0.005) for n in range(10)]
     assert stamps.index(True) <= 4 + 0
-    gate.call(1.0)
-    assert [gate.admits(1.0 + 0.03 * n) for n in range(4)] == [False, False, True, True]
+    frame_filter.request(1.0)
+    assert [frame_filter.accepts(1.0 + 0.03 * n) for n in range(4)] == [False, False, True, True]
 
 
 def test_an_unchanged_exposure_costs_no_frames() -> None:
-    gate = FrameFilter(0.01, 0.005, 0, None)
-    gate.call(1.0)
-    assert not gate.admits(1.014)
-    assert gate.admits(1.016)
+    frame_filter = FrameFilter(0.01, 0.005, 0, None)
+    frame_filter.request(1.0)
+    assert not frame_filter.accepts(1.014)
+    assert frame_filter.accepts(1.016)
 
 
 @pytest.mark.parametrize("late", [0, 2])
 def test_without_a_clock_frames_are_counted(late: int) -> None:
-    gate = FrameFilter(0.01, 0.005, late, 6)
-    gate.call(0.0)
-    assert [gate.admits(0.0) for _ in range(10)].index(True) == 6 + late
-    gate.call(0.0)
-    assert [gate.admits(0.0) for _ in range(10)].index(True) == 6
-    gate.exposure_changed(0.0, 0.02)
-    gate.call(0.0)
-    assert [gate.admits(0.0) for _ in range(10)].index(True) == 6 + late
+    frame_filter = FrameFilter(0.01, 0.005, late, 6)
+    frame_filter.request(0.0)
+    assert [frame_filter.accepts(0.0) for _ in range(10)].index(True) == 6 + late
+    frame_filter.request(0.0)
+    assert [frame_filter.accepts(0.0) for _ in range(10)].index(True) == 6
+    frame_filter.exposure_changed(0.0, 0.02)
+    frame_filter.request(0.0)
+    assert [frame_filter.accepts(0.0) for _ in range(10)].index(True) == 6 + late

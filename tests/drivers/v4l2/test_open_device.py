@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from drivers.v4l2 import ioctl as v4l2
+from drivers.v4l2 import ioctl
 from instrument.errors import DeviceError
 from sim.emulated.v4l2.device import CameraFaults
 from tests.support.v4l2.remote_camera import (
@@ -63,23 +63,23 @@ OPENING = [
     (fault(), {"gain": 485}, "gain 485 asked for; the camera allows 0 to 480 in steps of 10"),
     (fault(), {"gain": 105}, "gain 105 asked for, the camera took 100; .* in steps of 10"),
     (
-        fault(stuck_controls={v4l2.EXPOSURE_AUTO}),
+        fault(stuck_controls={ioctl.EXPOSURE_AUTO}),
         {},
         "manual exposure, which is mode 1 asked for, the camera took 3",
     ),
     (
-        fault(stuck_controls={v4l2.AUTOGAIN}),
+        fault(stuck_controls={ioctl.AUTOGAIN}),
         {},
         "automatic gain 0 asked for, the camera took 1",
     ),
     (
-        fault(stuck_controls={v4l2.AUTO_WHITE_BALANCE}),
+        fault(stuck_controls={ioctl.AUTO_WHITE_BALANCE}),
         {},
         "automatic white balance 0 asked for, the camera took 1",
     ),
-    (fault(stuck_controls={v4l2.GAMMA}), {}, "gamma 1 asked for, the camera took 2.2"),
+    (fault(stuck_controls={ioctl.GAMMA}), {}, "gamma 1 asked for, the camera took 2.2"),
     (
-        fault(refused_controls={v4l2.GAIN}),
+        fault(refused_controls={ioctl.GAIN}),
         {},
         r"gain 100 asked for; the camera refused it \(Permission denied\)",
     ),
@@ -114,7 +114,7 @@ def test_an_opening_that_went_wrong_says_what_was_asked_and_given(
 
 def test_a_gain_that_the_camera_does_not_have(remote: RemoteCamera, bench: Bench) -> None:
     with (
-        served(remote, bench, without_controls=frozenset({v4l2.GAIN})),
+        served(remote, bench, without_controls=frozenset({ioctl.GAIN})),
         pytest.raises(DeviceError, match=f"{WHO}: gain 100 asked for, but the camera has no such"),
     ):
         remote.ask("open", SETTINGS)

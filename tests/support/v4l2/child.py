@@ -18,8 +18,9 @@ from unittest.mock import patch
 
 import numpy as np
 
-from drivers.v4l2 import listing as v4l2_listing
-from drivers.v4l2.camera import V4l2Camera, V4l2Settings
+from drivers.v4l2 import listing
+from drivers.v4l2.camera import V4l2Camera
+from drivers.v4l2.settings import V4l2Settings
 from instrument.devices import Frame
 from instrument.errors import DeviceError
 
@@ -56,7 +57,7 @@ class Child:
     def ungated_grab(self, count: int) -> list[Frame]:
         """What a program gets that takes every frame as it comes."""
         assert self.camera is not None
-        with patch("drivers.v4l2.frame_filter.FrameFilter.admits", return_value=True):
+        with patch("drivers.v4l2.frame_filter.FrameFilter.accepts", return_value=True):
             return self.camera.grab(count)
 
     def said(self) -> list[str]:
@@ -91,8 +92,8 @@ class Child:
         """Descriptors and threads of this process."""
         return len(list(Path("/proc/self/fd").iterdir())), threading.active_count()
 
-    def describe(self, device: str) -> v4l2_listing.CameraDescription:
-        return v4l2_listing.describe(device)
+    def describe(self, device: str) -> listing.CameraDescription:
+        return listing.describe(device)
 
     def serve_here(self, settings: V4l2Settings, socket: str) -> list[tuple[int, float]]:
         """Device model and OpenCV in one process: counts and exposures of a few frames."""

@@ -38,7 +38,10 @@ if which("cc") is None:
 
 DEVICE = "/dev/v4l/by-id/usb-emulated-camera"
 DEADLINE_S = 20.0
-SETTINGS = V4l2Settings(DEVICE, "Y16", 64, 48, 16, 0.001, 2.0, gain=100)
+SETTINGS = V4l2Settings(
+    device=DEVICE, pixel_format="Y16", width_px=64, height_px=48, bit_depth=16,
+    min_exposure_s=0.001, max_exposure_s=2.0, gain=100,
+)  # fmt: skip
 QUICK = Capabilities(frames_per_s=200, overhead_s=0.001)
 
 

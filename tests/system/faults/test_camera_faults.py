@@ -37,7 +37,7 @@ from tests.support import faulty_scan
 from tests.support.faulty_scan import Ended, Watching, require_named
 from tests.support.paths import CONFIGS
 from tests.support.scans import changed, small_scan
-from tests.support.v4l2.remote_camera import DEVICE, QUICK, RemoteCamera
+from tests.support.v4l2.remote_camera import QUICK, SETTINGS, RemoteCamera
 
 pytestmark = pytest.mark.waits
 
@@ -75,8 +75,14 @@ def short() -> Loaded:
 
 def settings(loaded: Loaded) -> V4l2Settings:
     camera = loaded.rig.camera
-    span = (camera.min_exposure_s, camera.max_exposure_s)
-    return V4l2Settings(DEVICE, "Y16", *SIZE, camera.bit_depth, *span, gain=100)
+    return replace(
+        SETTINGS,
+        width_px=SIZE[0],
+        height_px=SIZE[1],
+        bit_depth=camera.bit_depth,
+        min_exposure_s=camera.min_exposure_s,
+        max_exposure_s=camera.max_exposure_s,
+    )
 
 
 class Relayed:
