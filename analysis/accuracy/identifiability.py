@@ -1,12 +1,12 @@
-"""Whether a sweep can tell a model's parameters apart, before anything is measured.
+"""Identifiability of a model's parameters from a planned sweep, by a condition number.
 
 What to use when: `condition` to judge a planned sweep for a model at likely values; above LIMIT a
-fit will not determine all parameters, and says so ("not identifiable").
+fit will not determine all parameters, and reports "not identifiable".
 
-The number is that of the Jacobian of ln(brdf) by the parameters, each in units of its domain: the
-largest singular value over the smallest. The largest is near sqrt(N) for N points (a scale over
-its domain), so that points of 1 % each leave the worst combination of parameters uncertain by about
-condition / (100 sqrt(N)) of a domain.
+The condition number is that of the Jacobian of ln(brdf) by the parameters, each in units of its
+domain: the largest singular value over the smallest. The largest is near sqrt(N) for N points (a
+scale over its domain), so that points of 1 % each leave the worst combination of parameters
+uncertain by about condition / (100 sqrt(N)) of a domain.
 """
 
 from __future__ import annotations
@@ -26,14 +26,15 @@ LIMIT = 200.0
 def condition(name: str, geometry: Geometry, values: Mapping[str, float]) -> float:
     """Condition number of a model's scaled Jacobian; infinite where a parameter has no effect.
 
-    Raises `ValueError` as the model does.
+    `geometry` of any shape; `values` are scalars in the units of the parameters. Raises
+    `ValueError` as the model does.
     """
     model = MODELS[name]
-    slopes = model.gradient(geometry, **values)
+    gradient = model.gradient(geometry, **values)
     brdf = model.brdf(geometry, **values)
-    columns = [slopes[p.name].ravel() * (p.high - p.low) for p in model.parameters]
-    sound = brdf.ravel() > 0
-    J = np.stack(columns, axis=1)[sound] / brdf.ravel()[sound, None]
+    columns = [gradient[p.name].ravel() * (p.high - p.low) for p in model.parameters]
+    positive = brdf.ravel() > 0
+    J = np.stack(columns, axis=1)[positive] / brdf.ravel()[positive, None]
     if J.shape[0] < J.shape[1]:
         return np.inf
     singular = np.linalg.svd(J, compute_uv=False)
@@ -43,7 +44,7 @@ def condition(name: str, geometry: Geometry, values: Mapping[str, float]) -> flo
 def sweep(
     theta_i_deg: Sequence[float], largest_deg: float, dphi_deg: float, points: int = 61
 ) -> Geometry:
-    """The standard sweep: view angles from -largest to largest at every incidence."""
+    """Standard sweep, shape (incidences, points): theta_r from -largest to largest, in degrees."""
     theta_r = np.linspace(-largest_deg, largest_deg, points)
     theta_i = np.asarray(theta_i_deg, dtype=np.float64)[:, None]
     return Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi_deg)
@@ -59,7 +60,8 @@ def condition_map(
 ) -> FloatArray:
     """`condition` of standard sweeps over roughness and their largest view angle, (sigma, largest).
 
-    `values`: the other parameters. The points are shared among the incidences, 61 in all.
+    Angles in degrees. `values`: the other parameters. The points are shared among the incidences,
+    61 in all.
     """
     points = max(61 // len(theta_i_deg), 3)
     sweeps = [sweep(theta_i_deg, float(end), dphi_deg, points) for end in largest_deg]

@@ -124,7 +124,8 @@ def fixed_cost(
 ) -> Callable[[Geometry, Ranges], Cost]:
     """Cost that depends on neither the geometries nor the parameters.
 
-    Without `call_again` and `again` a repeated evaluation costs what the first one does.
+    All are scalars in the unit of `Cost`. By default a repeated evaluation costs as much as the
+    first.
     """
     cost = Cost(
         call,

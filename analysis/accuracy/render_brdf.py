@@ -34,8 +34,8 @@ _CHECKS = 64  # at most, of doubtful geometries: a scan renders many pictures
 def adequate_brdf(name: str, parameters: Mapping[str, float], tolerance: float = TOLERANCE) -> Brdf:
     """The model's BRDF in 1/sr, with `oren_nayar_exact` by the cheapest method within `tolerance`.
 
-    All other models and terms are those of `MODELS`, bit for bit. Raises `KeyError` for an unknown
-    model; the returned function raises the model's own errors.
+    It keeps the geometry's shape. All other models and terms are those of `MODELS`, bit for bit.
+    Raises `KeyError` for an unknown model; the returned function raises the model's own errors.
     """
     model = MODELS[name]
     terms = model.terms or (model,)

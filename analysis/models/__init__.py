@@ -17,7 +17,8 @@ from analysis.models.minnaert import MINNAERT
 from analysis.models.rough.oren_nayar import OREN_NAYAR, OREN_NAYAR_QUALITATIVE
 from analysis.models.rough.oren_nayar_exact import OREN_NAYAR_EXACT
 from analysis.models.single_scattering import SINGLE_SCATTERING
-from analysis.models.smooth.wolff import WOLFF, WOLFF_OREN_NAYAR
+from analysis.models.smooth.wolff import WOLFF
+from analysis.models.smooth.wolff_oren_nayar import WOLFF_OREN_NAYAR
 from analysis.models.specular.beckmann_spizzichino import BECKMANN_SPIZZICHINO
 from analysis.models.specular.ggx import GGX, GGX_F90
 from analysis.models.specular.torrance_sparrow import TORRANCE_SPARROW, TORRANCE_SPARROW_LOBE

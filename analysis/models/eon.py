@@ -1,7 +1,7 @@
 """EON: the energy-preserving Oren-Nayar model of computer graphics.
 
-What to use when: a rough matte surface whose light balance must be right: at albedo 1 it reflects
-all light from every direction, which none of the papers' closed forms does.
+What to use when: a rough matte surface that must conserve energy: at albedo 1 it reflects all light
+from every direction, which none of the papers' closed forms does.
 
 Source: J. Portsmouth, P. Kutz, S. Hill, "EON: A Practical Energy-Preserving Rough Diffuse BRDF",
 Journal of Computer Graphics Techniques 14 (2025), arXiv 2410.18026 (2024); its single-scattering
@@ -26,7 +26,7 @@ _C2 = 2 / 3 - 28 / (15 * math.pi)
 
 
 def eon_brdf(geometry: Geometry, albedo: float, roughness: float) -> FloatArray:
-    """EON BRDF in 1/sr: f_ss + f_ms, `albedo` (rho) and `roughness` (r) of 0 to 1.
+    """EON BRDF: f_ss + f_ms of `albedo` (rho) and `roughness` (r). As in `Model.brdf`.
 
     f_ss = (rho/pi) A (1 + r s/t), A = 1/(1 + c1 r), c1 = 1/2 - 2/(3 pi),
     s = cos(dphi) sin_i sin_r, t = max(cos_i, cos_r) for s > 0, else 1;
@@ -45,7 +45,7 @@ def eon_brdf(geometry: Geometry, albedo: float, roughness: float) -> FloatArray:
 
 
 def eon_gradient(geometry: Geometry, albedo: float, roughness: float) -> dict[str, FloatArray]:
-    """Derivatives of `eon_brdf` by albedo and by roughness."""
+    """Derivatives of `eon_brdf` by albedo and by roughness. As in `Model.gradient`."""
     A = 1 / (1 + _C1 * roughness)
     s_over_t, shape = _s_over_t(geometry), _shape(geometry)
     rho_ms, by_albedo, by_E = _multiple_albedo(albedo, roughness)
@@ -59,13 +59,16 @@ def eon_gradient(geometry: Geometry, albedo: float, roughness: float) -> dict[st
 
 
 def eon_validity(geometry: Geometry, albedo: float, roughness: float) -> Validity:
-    """Everywhere but where lamp and camera both graze the surface on one side."""
-    endless = both_graze(geometry) & (geometry.cos_dphi > 0) & (albedo * roughness > 0)
-    return valid_except(geometry, (endless, GRAZING))
+    """Valid unless lamp and camera both graze on one side. Arguments as in `Model.brdf`."""
+    diverges = both_graze(geometry) & (geometry.cos_dphi > 0) & (albedo * roughness > 0)
+    return valid_except(geometry, (diverges, GRAZING))
 
 
 def directional_albedo(theta: FloatArray, roughness: float) -> FloatArray:
-    """E_i: what f_ss at rho = 1 reflects of the light from theta (radians): A (1 + r G/pi)."""
+    """E_i = A (1 + r G/pi): fraction of the light from theta that f_ss reflects at rho = 1.
+
+    `theta` in radians, any shape, which is the result's. Library only.
+    """
     return np.asarray(1 - roughness * _loss(theta) / (1 + _C1 * roughness))
 
 

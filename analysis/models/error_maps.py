@@ -73,7 +73,10 @@ def maps() -> Mapping[str, Levels]:
 
 
 def cells_of(edges: FloatArray, low: float, high: float) -> slice:
-    """Indices of the cells between `edges` (M,), rising, that a range from low to high touches."""
+    """Indices of the cells that a range from low to high touches, in the unit of the edges.
+
+    `edges` (M,) rise.
+    """
     first = int(np.searchsorted(edges, low, side="left")) - 1
     last = int(np.searchsorted(edges, high, side="right")) - 1
     first, last = (min(max(cell, 0), edges.size - 2) for cell in (first, last))
@@ -83,6 +86,6 @@ def cells_of(edges: FloatArray, low: float, high: float) -> slice:
 def cell_at(edges: FloatArray, value: FloatArray) -> IntArray:
     """Index of the cell between `edges` (M,), rising, that holds each value (any shape).
 
-    Values beyond the edges belong to the outer cells.
+    Both have one unit. Values beyond the edges belong to the outer cells.
     """
     return np.clip(np.searchsorted(edges, value, side="right") - 1, 0, edges.size - 2)

@@ -1,7 +1,7 @@
-"""Light scattered once inside the surface, by particles that prefer a direction.
+"""Single scattering below the surface by particles with a directional phase function.
 
 What to use when: beside a diffuse term, for loose or layered matter (fibres, powder, skin, plants)
-that sends light back to the lamp, or on past the mirror direction, over a wide range of angles.
+that scatters back towards the lamp, or forward past the mirror direction, over wide angles.
 
 Sources: H. von Seeliger (1887) and E. Lommel (1889), for the half-space, as in S. Chandrasekhar,
 Radiative Transfer (Dover 1960), chapter III; L. G. Henyey, J. L. Greenstein, "Diffuse Radiation in
@@ -18,7 +18,7 @@ from analysis.models.base import Model, Parameter, Validity, cached_per_geometry
 from analysis.models.validity import GRAZING, both_graze, valid_except
 from instrument.geometry import FloatArray, Geometry
 
-# A single-scattering albedo up to 1; above, light scattered more than once goes the same way.
+# A single-scattering albedo up to 1; above, it stands for multiple scattering of like direction.
 SCATTERING = Parameter("scattering", "1", 0.0, 10.0, 0.5, scale=True)
 ASYMMETRY = Parameter(
     "asymmetry", "1", -0.95, 0.95, 0.0, starts=(-0.85, -0.6, -0.3, 0.0, 0.3, 0.6, 0.85)
@@ -26,11 +26,12 @@ ASYMMETRY = Parameter(
 
 
 def single_scattering_brdf(geometry: Geometry, scattering: float, asymmetry: float) -> FloatArray:
-    """Lommel and Seeliger's BRDF in 1/sr: scattering p(gamma) / (4 pi (cos_i + cos_r)).
+    """Lommel and Seeliger's BRDF: scattering p(gamma) / (4 pi (cos_i + cos_r)).
 
+    Arguments and result as in `Model.brdf`.
     p = (1 - g^2) / (1 + g^2 + 2 g cos(gamma))^(3/2) is Henyey and Greenstein's phase function of
     gamma, the angle between the directions to lamp and camera (the light turns by pi - gamma), and
-    g = `asymmetry`: below 0 back to the lamp, 0 to all sides, above 0 forward. The mean of p over
+    g = `asymmetry`: below 0 backward, 0 isotropic, above 0 forward. The mean of p over
     the sphere is 1. Never negative; reciprocal; half of Lambert's for g = 0 at normal incidence and
     view. It grows without limit only where lamp and camera both graze the surface.
     """
@@ -42,7 +43,7 @@ def single_scattering_brdf(geometry: Geometry, scattering: float, asymmetry: flo
 def single_scattering_gradient(
     geometry: Geometry, scattering: float, asymmetry: float
 ) -> dict[str, FloatArray]:
-    """Derivatives of `single_scattering_brdf` by scattering and by asymmetry."""
+    """Derivatives of `single_scattering_brdf` by both. As in `Model.gradient`."""
     g = asymmetry
     per_scattering = single_scattering_brdf(geometry, 1.0, g)
     _, base = _denominators(geometry, g)
@@ -51,12 +52,12 @@ def single_scattering_gradient(
 
 
 def single_scattering_validity(geometry: Geometry, scattering: float, asymmetry: float) -> Validity:
-    """Where particles scatter no more than they receive, and not where both directions graze."""
-    del asymmetry  # where it holds does not depend on it
+    """Valid for scattering up to 1, unless both directions graze. Arguments as in `Model.brdf`."""
+    del asymmetry  # validity does not depend on it
     return valid_except(
         geometry,
         (both_graze(geometry) & (scattering > 0), GRAZING),
-        (scattering > 1, "scattering above 1: particles would send out more than they receive"),
+        (scattering > 1, "scattering above 1: particles would scatter more than they receive"),
     )
 
 

@@ -1,18 +1,18 @@
 """Oren and Nayar's model without its approximations: the Gaussian surface (31) by integration.
 
-What to use when: `oren_nayar_exact` where a fit or a conclusion must not rest on how good the
-functional form (`oren_nayar`) is: at oblique angles, far forward, at high roughness.
+What to use when: `oren_nayar_exact` where the error of the functional form (`oren_nayar`) matters:
+at oblique angles, far forward, at high roughness.
 
-How: the isotropic single-slope radiance (29) of a geometry does not depend on sigma, and on the
-albedo only by its powers. A `Profile` keeps it at the nodes of a quadrature over the slope
-theta_a, so that a new sigma or albedo is only a new weighting; the last ones are kept.
+Method: the isotropic single-slope radiance (29) of a geometry does not depend on sigma, and on the
+albedo only by its powers. A `Profile` stores it at the nodes of a quadrature over the slope
+theta_a, so that a new sigma or albedo is only a new weighting; the latest profiles are cached.
 
-The slopes are cut at every kink: 90 - theta_i and 90 - theta_r, where shadowing and masking set
+The slopes are divided at every kink: 90 - theta_i and 90 - theta_r, where shadowing and masking set
 in, and the two slopes at which a critical azimuth of the lamp meets one of the camera. Within a
-piece the nodes count e-folds of the slope (narrow and wide Gaussians then need the same number)
-and are drawn to the ends, where the radiance has half-integer powers: Gauss-Legendre converges
-exponentially. Below the first kink the radiance is 1 + tan^2(theta_a) times a constant, and its
-mean comes from a table for each sigma.
+piece the nodes are spaced in e-folds of the slope (narrow and wide Gaussians then need the same
+number) and clustered at the ends, where the radiance has half-integer powers: Gauss-Legendre
+converges exponentially. Below the first kink the radiance is 1 + tan^2(theta_a) times a constant,
+and its mean comes from a table for each sigma.
 
 Source: M. Oren, S. K. Nayar, "Generalization of the Lambertian Model and Implications for Machine
 Vision", International Journal of Computer Vision 14 (1995), section 4.3.
@@ -41,9 +41,9 @@ from instrument.geometry import FloatArray, Geometry
 
 
 class Rule(NamedTuple):
-    """Numbers of nodes: `slopes` a piece and `per_e` more an e-fold of slope; `azimuths` a piece.
+    """Numbers of nodes: `slopes` per piece, `per_e` more per e-fold of slope, `azimuths` per piece.
 
-    A shorter piece takes fewer of the `slopes`.
+    A shorter piece uses fewer of the `slopes`.
     """
 
     slopes: int
@@ -59,9 +59,9 @@ FINE = Rule(18, 11, 28)
 """1e-8 relative."""
 
 CACHE_BYTES = 256 * 2**20
-"""What the kept profiles may take, about 1 kB a geometry; the longest unused goes first."""
+"""Size limit of the profile cache, about 1 kB a geometry; the least recently used goes first."""
 
-_BLOCK = 1024  # geometries at a time: their arrays stay in a processor's cache
+_BLOCK = 1024  # geometries at a time: their arrays stay in the processor's cache
 _MIRROR = 1e-8  # radians: a surface of slopes below it is Lambert's to rounding
 _CLOSED_END = math.radians(80)  # end of the closed part: beyond, tan^2 grows too steeply
 _OFFSET = math.radians(0.3)  # slopes well below it are counted in degrees, not in e-folds
@@ -70,13 +70,13 @@ _OFFSET = math.radians(0.3)  # slopes well below it are counted in degrees, not 
 def oren_nayar_exact_brdf(
     geometry: Geometry, albedo: float, sigma_deg: float, rule: Rule = RULE
 ) -> FloatArray:
-    """Oren and Nayar's exact BRDF in 1/sr: 1995, equations (31) with (29), (28), (27), (16), (24).
+    """Oren and Nayar's exact BRDF: 1995, equations (31) with (29), (28), (27), (16), (24).
 
-    V-cavities of Lambertian facets whose slope angle is normally distributed with the standard
-    deviation `sigma_deg` (32): exact shadowing and masking, exact light of two bounces, no mixing
-    of azimuths (44). Erratum: (31) lacks 2 pi. Reciprocal to the last bit; never negative;
-    Lambert's at sigma = 0. It grows without limit only where lamp and camera both graze the
-    surface and are not opposite to each other.
+    Arguments and result as in `Model.brdf`. V-cavities of Lambertian facets whose slope angle is
+    normally distributed with the standard deviation `sigma_deg` (32): exact shadowing and masking,
+    exact light of two bounces, no mixing of azimuths (44). Erratum: (31) lacks 2 pi. Reciprocal to
+    the last bit; never negative; Lambert's at sigma = 0. It grows without limit only where lamp and
+    camera both graze the surface and are not opposite to each other.
 
     Accuracy, relative, for sigma 0.5 to 60 degrees, theta up to 85 degrees, all dphi: 1e-6. The
     first evaluation of a geometry takes 0.1 ms (one core of 2 GHz), a new sigma or albedo on it
@@ -92,7 +92,7 @@ def oren_nayar_exact_brdf(
 def oren_nayar_exact_gradient(
     geometry: Geometry, albedo: float, sigma_deg: float
 ) -> dict[str, FloatArray]:
-    """Derivatives of the BRDF: by `albedo` in 1/sr, by `sigma_deg` in 1/sr per degree.
+    """Derivatives of `oren_nayar_exact_brdf` by albedo and sigma. As in `Model.gradient`.
 
     Under the integral: d ln P / d sigma = (theta_a^2 - <theta_a^2>) / sigma^3, where the mean
     square slope <theta_a^2> is the normalisation's part.
@@ -110,9 +110,10 @@ def oren_nayar_exact_gradient(
 
 
 class Nodes(NamedTuple):
-    """Pieces with the same number of nodes: `at` is each piece's geometry, the rest (node, piece).
+    """Pieces with the same number of nodes; `at` (piece,): index of the geometry of each.
 
-    Squares of theta_a, and the two parts of the radiance times sin(theta_a) and the weight.
+    Of shape (node, piece): squares of theta_a, and the two parts of the radiance times sin(theta_a)
+    and the weight.
     """
 
     theta2: FloatArray
@@ -136,12 +137,15 @@ class Profile:
 
     @property
     def nbytes(self) -> int:
-        """Size of the arrays."""
+        """Size of the arrays in bytes."""
         own = self.first.nbytes + self.bend.nbytes
         return own + sum(array.nbytes for nodes in self.nodes for array in nodes)
 
     def average(self, sigma: float, power: int) -> tuple[FloatArray, FloatArray]:
-        """Mean of theta_a^(2 power) times each part over the slopes: (31) with its 2 pi."""
+        """Mean of theta_a^(2 power) times each part over the slopes: (31) with its 2 pi.
+
+        `sigma` in radians. Direct and two-bounce part, (N,), in units of `v_cavity`.
+        """
         flat, flat2, bent, bent2 = _table(sigma, power).at(self.first)
         direct, twice = flat + self.bend * flat2, bent - self.bend * bent2
         for nodes in self.nodes:
@@ -157,14 +161,14 @@ class Profile:
 
 
 def profile(larger: FloatArray, smaller: FloatArray, dphi: FloatArray, rule: Rule) -> Profile:
-    """Profile of geometries: the larger and the smaller of theta_i, theta_r, and dphi, radians.
+    """Profile of geometries (N,): larger and smaller of theta_i and theta_r, and dphi, in radians.
 
-    The radiance over E0 cos(theta_i) is reciprocal, so the order decides nothing else.
+    The radiance over E0 cos(theta_i) is reciprocal, so the order does not matter.
     """
     edges = slope_kinks(larger, smaller, dphi)
     start, end = edges[:-1].ravel(), edges[1:].ravel()
     width = np.log((end + _OFFSET) / (start + _OFFSET))
-    # The error of a piece goes as its width, so one narrower by 1e-6 needs no nodes.
+    # The error of a piece is proportional to its width: one narrower by 1e-6 needs no nodes.
     share = np.clip(1 + np.log(np.maximum(width, 1e-9)) / math.log(1e6), 0.1, 1.0)
     count = 2 * np.ceil((rule.slopes * share + rule.per_e * width) / 2).astype(np.intp)
     count[end - start < 1e-12] = 0
@@ -172,7 +176,7 @@ def profile(larger: FloatArray, smaller: FloatArray, dphi: FloatArray, rule: Rul
     for number in np.unique(count[count > 0]):
         piece = np.flatnonzero(count == number)
         at = piece % larger.size
-        theta, weight = _drawn(start[piece], width[piece], int(number))
+        theta, weight = _clustered(start[piece], width[piece], int(number))
         part = isotropic_single_slope(larger[at], smaller[at], dphi[at], theta, rule.azimuths)
         weight *= np.sin(theta)
         nodes.append(Nodes(theta * theta, weight * part.direct, weight * part.twice, at))
@@ -197,10 +201,11 @@ def slope_kinks(larger: FloatArray, smaller: FloatArray, dphi: FloatArray) -> Fl
     return np.stack([closed, set_in, both, *meet, right])
 
 
-def _drawn(start: FloatArray, width: FloatArray, number: int) -> tuple[FloatArray, FloatArray]:
+def _clustered(start: FloatArray, width: FloatArray, number: int) -> tuple[FloatArray, FloatArray]:
     """Nodes theta_a and weights on pieces that span `width` e-folds: shape (number, piece).
 
-    t^2 (3 - 2 t) draws the nodes to both ends: a half-integer power there becomes a whole one.
+    t^2 (3 - 2 t) clusters the nodes at both ends: a half-integer power there becomes an integer
+    one.
     """
     t, w = (array[:, None] for array in _gauss(number))
     shifted = (start + _OFFSET) * np.exp(width * (t * t * (3 - 2 * t)))
@@ -213,7 +218,7 @@ class _Table(NamedTuple):
 
     step: float
     values: FloatArray
-    slopes: FloatArray
+    gradients: FloatArray
 
     def at(self, theta: FloatArray) -> FloatArray:
         """Integrals up to theta by cubic Hermite interpolation, about 1e-9; the last one beyond."""
@@ -224,7 +229,7 @@ class _Table(NamedTuple):
         r = 1 - s
         ends = s * s * (3 - 2 * s)
         value = self.values[:, i] * (1 - ends) + self.values[:, i + 1] * ends
-        return np.asarray(value + s * r * (r * self.slopes[:, i] - s * self.slopes[:, i + 1]))
+        return np.asarray(value + s * r * (r * self.gradients[:, i] - s * self.gradients[:, i + 1]))
 
 
 @lru_cache(maxsize=256)
@@ -298,7 +303,7 @@ class _ProfileCache:
         return made
 
     def clear(self) -> None:
-        """Forget all."""
+        """Drop all profiles."""
         with self._lock:
             self._profiles.clear()
             self._nbytes = 0
@@ -306,11 +311,11 @@ class _ProfileCache:
 
 _CACHE = _ProfileCache()
 clear_profile_cache = _CACHE.clear
-"""Drop the kept profiles and free their memory."""
+"""Drop the cached profiles and free their memory."""
 
 
 def oren_nayar_exact_validity(geometry: Geometry, albedo: float, sigma_deg: float) -> Validity:
-    """Everywhere but where lamp and camera both graze the surface: the integral has no limit."""
+    """Valid unless lamp and camera both graze: no limit there. Arguments as in `Model.brdf`."""
     grazing = both_graze(geometry) & (albedo > 0) & (sigma_deg > 0)
     return valid_except(geometry, (grazing, "lamp and camera both graze the surface: no limit"))
 

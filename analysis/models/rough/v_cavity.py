@@ -2,13 +2,13 @@
 
 What to use when: `attenuation`, `interreflection_factor` and `projected_radiance` for one facet,
 as printed; `unidirectional_single_slope` for a grooved surface; `isotropic_single_slope` for facets
-of one slope in all azimuths, quick and exact (`analysis.models.rough.oren_nayar_exact` averages it
-over slopes).
+of one slope in all azimuths, fast and exact (`analysis.models.rough.oren_nayar_exact` averages it
+over slopes). All but the last are library only.
 
 Angles are in radians; theta_i, phi_i point to the lamp, theta_r, phi_r to the camera, theta_a,
-phi_a along the facet's normal; phi = 0 is one azimuth for all. Every argument broadcasts; a theta
-outside 0 to pi/2 is a `ValueError`. A radiance is given as its two parts, `(direct, twice)`, over
-E0 cos(theta_i):
+phi_a along the facet's normal; phi = 0 is one azimuth for all. Arguments are scalars or arrays that
+broadcast to the result's shape; a theta outside 0 to pi/2 is a `ValueError`. A radiance is given as
+its two parts, `(direct, twice)`, over E0 cos(theta_i):
 
     L / (E0 cos theta_i) = (albedo / pi) direct + (albedo^2 / pi) twice      in 1/sr.
 
@@ -23,12 +23,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.models.validity import polar
-from instrument.geometry import FloatArray
-
-IntArray = NDArray[np.intp]
+from instrument.geometry import FloatArray, IntArray
 
 
 class Radiance(NamedTuple):
@@ -48,8 +45,9 @@ class Directions(NamedTuple):
 
 
 def attenuation(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> FloatArray:
-    """Geometric attenuation factor (16): the part of the facet that is both lit and seen.
+    """Geometric attenuation factor (16), 0 to 1: the part of the facet that is both lit and seen.
 
+    Radians; all arguments broadcast.
     Max[0, Min[1, 2<s,n><a,n>/<s,a>, 2<v,n><a,n>/<v,a>]]: the three cases of Table 1, and 0 where
     the facet turns away from the lamp or the camera. The order of Max and Min is footnote 6's.
     """
@@ -62,8 +60,9 @@ def attenuation(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> 
 def critical_angle(theta: FloatArray, theta_a: FloatArray) -> FloatArray:
     """Critical azimuth phi_c of (39) in radians, for a lamp or a camera at theta.
 
-    Table 2: facets within phi_c of the lamp's azimuth are partly shadowed, those within phi_c of
-    the opposite one turn away from it; likewise masking and the camera. 0 where no facet is.
+    Both arguments in radians, broadcast. Table 2: facets within phi_c of the lamp's azimuth are
+    partly shadowed, those within phi_c of the opposite one turn away from it; likewise masking and
+    the camera. 0 where no facet is.
     """
     return _critical(np.tan(polar("theta", theta)) * np.tan(polar("theta_a", theta_a)))
 
@@ -71,7 +70,8 @@ def critical_angle(theta: FloatArray, theta_a: FloatArray) -> FloatArray:
 def masked_width(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> FloatArray:
     """m_v / w of (20), 0 to 1: the part of the facet, from the groove up, hidden from the camera.
 
-    Erratum: printed as "visible"; the integral (23) starts at it. 1 where the facet turns away.
+    Radians; all arguments broadcast. Erratum: printed as "visible"; the integral (23) starts at it.
+    1 where the facet turns away.
     """
     va, va_other = (_to_camera(towards, theta_a, phi) for phi in (phi_a, phi_a + np.pi))
     return np.where(va > 0, np.clip(-_over(va_other, va), 0.0, 1.0), 1.0)
@@ -80,7 +80,8 @@ def masked_width(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) ->
 def shadowed_width(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> FloatArray:
     """m^s / w of (21), 0 to 1: the part of the ADJACENT facet that lies in shadow.
 
-    Erratum: printed as "illuminated". 1 where that facet turns away from the lamp.
+    Radians; all arguments broadcast. Erratum: printed as "illuminated". 1 where that facet turns
+    away from the lamp.
     """
     sa, sa_other = (_to_lamp(towards, theta_a, phi) for phi in (phi_a, phi_a + np.pi))
     return np.where(sa_other > 0, np.clip(-_over(sa, sa_other), 0.0, 1.0), 1.0)
@@ -91,18 +92,22 @@ def interreflection_factor(
 ) -> FloatArray:
     """Interreflection factor (24) of the widths m_v / w and m^s / w; pi (1 - cos) for open facets.
 
-    pi/2 [d(1, m_v) + d(1, m^s) - d(m^s, m_v) - d(1, 1)], with the distances d of (25).
+    pi/2 [d(1, m_v) + d(1, m^s) - d(m^s, m_v) - d(1, 1)], with the distances d of (25). `theta_a` in
+    radians; all broadcast.
     """
 
     def d(x: FloatArray | float, y: FloatArray | float) -> FloatArray:
         return np.sqrt(np.maximum(0.0, x * x + 2 * x * y * np.cos(2 * theta_a) + y * y))
 
     exchanged = d(1.0, masked) + d(1.0, shadowed) - d(shadowed, masked) - d(1.0, 1.0)
-    return np.pi / 2 * np.maximum(exchanged, 0.0)  # rounding may leave it just below
+    return np.pi / 2 * np.maximum(exchanged, 0.0)  # rounding may make it slightly negative
 
 
 def projected_radiance(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> Radiance:
-    """Projected radiance of one facet: (10) times (16), Table 1; and (26). Sum: (27)."""
+    """Projected radiance of one facet: (10) times (16), Table 1; and (26). Sum: (27).
+
+    Radians; all arguments broadcast. The parts are in the unit of the module.
+    """
     sa, sa_other = (_to_lamp(towards, theta_a, phi) for phi in (phi_a, phi_a + np.pi))
     va = _to_camera(towards, theta_a, phi_a)
     scale = np.cos(theta_a) * np.cos(towards.theta_i) * np.cos(towards.theta_r)
@@ -117,7 +122,10 @@ def projected_radiance(towards: Directions, theta_a: FloatArray, phi_a: FloatArr
 def unidirectional_single_slope(
     towards: Directions, theta_a: FloatArray, phi_a: FloatArray
 ) -> Radiance:
-    """Radiance of grooves of one slope and one azimuth: (28), the mean of their two facets."""
+    """Radiance of grooves of one slope and one azimuth: (28), the mean of their two facets.
+
+    Radians; all arguments broadcast. The parts are in the unit of the module.
+    """
     one = projected_radiance(towards, theta_a, phi_a)
     other = projected_radiance(towards, theta_a, phi_a + np.pi)
     return Radiance((one.direct + other.direct) / 2, (one.twice + other.twice) / 2)
@@ -132,12 +140,13 @@ def isotropic_single_slope(
 ) -> Radiance:
     """Radiance of facets of one slope in all azimuths: (29), the mean of (28) over phi_a.
 
-    Any shapes that broadcast, theta_a up to below pi/2. The half circle of cavities is cut at
-    every kink: the critical angles of shadowing and masking (39), and where the two widths are
-    equal. In between, the direct part is a trigonometric polynomial and is integrated in closed
-    form; so is the part of two bounces where nothing is hidden. Elsewhere that takes Gauss-Legendre
-    of `nodes` nodes (4 or more; 10 give 1e-6, 28 give 1e-8), 2 nodes - 4 where lamp and camera are
-    both partly hidden, fewer on narrow pieces. No mixing of azimuths (44).
+    Angles in radians, of shapes that broadcast; theta_a is below pi/2. The half circle of cavities
+    is cut at every kink: the critical angles of shadowing and masking (39), and where the two
+    widths are equal. In between, the direct part is a trigonometric polynomial and is integrated in
+    closed form; so is the part of two bounces where nothing is hidden. Elsewhere that part is
+    integrated by Gauss-Legendre quadrature of `nodes` nodes (4 or more; 10 give 1e-6, 28 give
+    1e-8), of 2 nodes - 4 where lamp and camera are both partly hidden, and of fewer on narrow
+    pieces. No mixing of azimuths (44).
     """
     if nodes < 4:
         raise ValueError(f"nodes = {nodes}; allowed: 4 or more")
@@ -149,7 +158,7 @@ def isotropic_single_slope(
     direct, twice = panels.closed(cavities)
     twice += _hidden_twice(cavities, panels, nodes)
     mean = np.cos(cavities.theta_a) / (2 * np.pi)
-    # Rounding may leave a part that vanishes just below zero.
+    # Rounding may make a vanishing part slightly negative.
     direct, twice = np.maximum(direct * mean, 0.0), np.maximum(twice * mean, 0.0)
     return Radiance(direct.reshape(shape), twice.reshape(shape))
 
@@ -176,7 +185,7 @@ def _cosine(
 
 
 def _over(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
-    """Quotient, and +-infinity over zero without a warning."""
+    """Quotient; +-infinity for division by zero, without a warning."""
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         return np.asarray(numerator / denominator)
 
@@ -203,8 +212,8 @@ class _Cavities(NamedTuple):
     both > 1, s = -1   0                   (1 + U_i) e_r + (1 + U_r) e_i + (U_i U_r - 1) cos - W
     =================  ==================  ====================================================
 
-    This is Table 1, and (26) with (24): in those, 1 - m_v / w = 2 / (1 + U_r) makes of d(1, m_v)
-    the square root in e = sqrt(sin^2 + U^2 cos^2) - U cos = sin (sqrt(1 + g^2) - g), with
+    This is Table 1, and (26) with (24): in those, 1 - m_v / w = 2 / (1 + U_r) turns d(1, m_v)
+    into the square root in e = sqrt(sin^2 + U^2 cos^2) - U cos = sin (sqrt(1 + g^2) - g), with
     g = U / tan(theta_a); and of d(m^s, m_v), W^2 = (U_i U_r - 1)^2 cos^2 + (U_i - U_r)^2 sin^2.
     """
 
@@ -223,7 +232,7 @@ class _Cavities(NamedTuple):
         return cls(tan_i, tan_r, dphi, theta_a, tan_i * slope, tan_r * slope)
 
     def chosen(self, at: IntArray) -> _Cavities:
-        """The cavities at those places."""
+        """Cavities at those indices."""
         return _Cavities(*(values[at] for values in self))
 
     def swapped(self) -> _Cavities:
@@ -231,7 +240,7 @@ class _Cavities(NamedTuple):
         return _Cavities(self.tan_r, self.tan_i, -self.dphi, self.theta_a, self.q, self.p)
 
     def kinks(self) -> FloatArray:
-        """Azimuths where a case ends, rising within 0 to pi, then the first again: (7, ...)."""
+        """Azimuths (7, ...) where a case ends, rising within 0 to pi, then the first plus pi."""
         phi_i, phi_r = _critical(self.p), _critical(self.q)
         cos_dphi, sin_dphi = _cos_sin(self.dphi)
         x, y = self.q * cos_dphi, self.q * sin_dphi
@@ -247,7 +256,8 @@ class _Cavities(NamedTuple):
 class _Panels(NamedTuple):
     """Azimuths between kinks, shape (6, ...): middle, half width, and u, v in the middle.
 
-    v is u with the sine for the cosine. Beyond 1 in the middle, |u| is beyond 1 all over the panel.
+    v is u with the sine for the cosine. Where |u| exceeds 1 in the middle it does so all over the
+    panel.
     """
 
     middle: FloatArray
@@ -281,7 +291,7 @@ class _Panels(NamedTuple):
         return 2 * direct, 2 * _one_minus_cos(c.theta_a) * twice
 
     def hidden(self) -> tuple[IntArray, IntArray, IntArray]:
-        """Where (of the flat arrays) two bounces are shadowed, masked, and both from two sides."""
+        """Flat indices where two bounces are shadowed, masked, and both from opposite sides."""
         dark, unseen = np.abs(self.u_i) > 1, np.abs(self.u_r) > 1
         across = dark & unseen & (self.u_i * self.u_r < 0)
         used = self.half > 0
@@ -306,9 +316,9 @@ def _hidden_twice(c: _Cavities, panels: _Panels, nodes: int) -> FloatArray:
 
 
 def _by_width(panel: IntArray, half: FloatArray, nodes: int) -> Iterator[tuple[IntArray, int]]:
-    """The panels in parts of like half width (radians), and the nodes that each part needs.
+    """Panels grouped by half width (radians), and the number of nodes that each group needs.
 
-    No part has more nodes than arrays in a processor's cache hold.
+    No group has more nodes than arrays in a processor's cache hold.
     """
     size = np.searchsorted(_HALF_WIDTHS, half[panel])
     for n, share in enumerate(_SHARES):
@@ -323,12 +333,12 @@ _CHUNK = 8192
 
 
 def _shadowed(c: _Cavities, middle: FloatArray, half: FloatArray, nodes: int) -> FloatArray:
-    """Integral over panels in shadow that nothing masks."""
+    """Integral over panels that are shadowed and not masked."""
     return _once_hidden(c, middle, half, nodes)
 
 
 def _masked(c: _Cavities, middle: FloatArray, half: FloatArray, nodes: int) -> FloatArray:
-    """As shadowed, but seen from the camera."""
+    """Integral over panels that are masked and not shadowed: lamp and camera exchanged."""
     return _once_hidden(c.swapped(), middle - c.dphi, half, nodes)
 
 
@@ -361,7 +371,7 @@ def _across(c: _Cavities, middle: FloatArray, half: FloatArray, nodes: int) -> F
     return np.asarray(half * (w @ value))
 
 
-_TINY = 1e-300  # keeps 0 / 0 from being asked for
+_TINY = 1e-300  # avoids 0 / 0
 
 
 def _one_minus_cos(theta: FloatArray) -> FloatArray:
@@ -370,7 +380,7 @@ def _one_minus_cos(theta: FloatArray) -> FloatArray:
 
 
 def _cos_sin(angle: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Cosine and sine by the tangent of half the angle: one call, which is half the time."""
+    """Cosine and sine from the tangent of half the angle: one call, in half the time."""
     t = np.tan(angle / 2)
     square = t * t
     scale = 1 / (1 + square)
@@ -379,9 +389,9 @@ def _cos_sin(angle: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 @cache
 def _clustered(nodes: int, k: float) -> tuple[FloatArray, FloatArray]:
-    """Gauss-Legendre on -1 to 1, drawn to both ends by tanh(k x) / tanh(k).
+    """Gauss-Legendre on -1 to 1, clustered at both ends by tanh(k x) / tanh(k).
 
-    The square roots of the integrands have their branch points just beyond the kinks.
+    The square roots in the integrands have their branch points just beyond the kinks.
     """
     x, w = np.polynomial.legendre.leggauss(nodes)
     end = np.tanh(k)

@@ -1,19 +1,19 @@
 """Chandrasekhar's H-function for isotropic scattering in a half-space.
 
-What to use when: `h_exact` always; `h_order` to follow the paper. The order N that the N-th order
-form needs for a relative error, over albedos of 0 to 1, measured against `h_exact`:
+What to use when: `h_exact` always; `h_order` to follow the paper. Order N needed for a relative
+error, over albedos of 0 to 1, measured against `h_exact`:
 
     error             1e-2   1e-3   1e-4   1e-5   1e-6   1e-7
     mu of 0 to 1         7     63    621  ~6200      -      -
     mu of 0.1 to 1       6     22     72    227    718      -
     mu of 0.5 to 1       4     11     33    102    321   1015
-    mu of 0.745 to 1     3      9     27     84    263    831    (all that `wolff` asks at n = 1.5)
+    mu of 0.745 to 1     3      9     27     84    263    831    (all that `wolff` needs at n = 1.5)
 
 The largest error is 0.062/N, near mu = 0.5/N, where H has a term mu ln(mu) that no finite product
 has; away from there the error falls as 1/N^2.
 
 Sources: S. Chandrasekhar, Radiative Transfer (Dover 1960), chapters III and V; L. B. Wolff,
-S. K. Nayar, M. Oren, IJCV 30 (1998), section 2.2, with its indices put right.
+S. K. Nayar, M. Oren, IJCV 30 (1998), section 2.2, with its indices corrected.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ def h_exact(mu: ArrayLike, albedo: float) -> FloatArray:
     """H(mu) for cosines mu of 0 to 1 and a single-scattering albedo rho of 0 to 1.
 
     ln H(mu) = -(mu/pi) int_0^{pi/2} ln(1 - rho t cot t) / (cos^2 t + mu^2 sin^2 t) dt,
-    with relative errors below 1e-12 (2e-14 measured), at rho = 1 too. Shape of `mu`; no unit.
+    with relative errors below 1e-12 (2e-14 measured), at rho = 1 too. `mu` has any shape, which is
+    the result's; both are dimensionless.
     """
     return np.exp(_transform(mu, _logarithms(_in_unit("albedo", albedo))))
 
@@ -47,7 +48,7 @@ def log_h_gradient(mu: ArrayLike, albedo: float) -> FloatArray:
     """Derivative of ln H(mu) by the albedo rho < 1, under the integral of `h_exact`.
 
     (mu/pi) int_0^{pi/2} t cot t / (1 - rho t cot t) / (cos^2 t + mu^2 sin^2 t) dt; it grows as
-    1/sqrt(1 - rho).
+    1/sqrt(1 - rho). `mu` of any shape, a cosine, dimensionless.
     """
     if not 0 <= albedo < 1:
         raise ValueError(f"albedo = {albedo:g}; allowed: 0 to 1, below 1")
@@ -60,6 +61,7 @@ def log_h_gradient_by_mu(mu: ArrayLike, albedo: float) -> FloatArray:
     """Derivative of ln H(mu) by mu above 0, under the integral of `h_exact`.
 
     -(1/pi) int_0^{pi/2} ln(1 - rho t cot t) (cos^2 t - mu^2 sin^2 t)/(cos^2 t + mu^2 sin^2 t)^2 dt.
+    `mu` of any shape, a cosine, dimensionless.
     """
     strength = _logarithms(_in_unit("albedo", albedo))
     mu2 = np.square(np.asarray(mu, dtype=np.float64))[..., np.newaxis]
@@ -83,6 +85,7 @@ def h_order(mu: ArrayLike, albedo: float, order: int) -> FloatArray:
     """H(mu) in the N-th order form, N = `order`: H = prod (1 + mu/mu_i) / prod (1 + kappa_a mu).
 
     i and a run from 1 to N (errata: 1998 mixes n and N); mu_i are the positive zeros of P_2N.
+    `mu` of any shape, a cosine, dimensionless.
     """
     mu = _cosine(mu)[..., np.newaxis]
     mu_i, _ = _gauss(order)
@@ -94,10 +97,11 @@ def h_order(mu: ArrayLike, albedo: float, order: int) -> FloatArray:
 
 @lru_cache(maxsize=256)
 def characteristic_roots(albedo: float, order: int) -> FloatArray:
-    """The N roots kappa >= 0, rising, of 1 = rho sum_j a_j / (1 - kappa^2 mu_j^2).
+    """Roots kappa >= 0, (N,), rising, of 1 = rho sum_j a_j / (1 - kappa^2 mu_j^2).
 
-    Their squares are the eigenvalues of diag(1/mu_j^2) - rho z z^T with z_j = sqrt(a_j)/mu_j. The
-    smallest comes from prod kappa^2 = (1 - rho) prod 1/mu_j^2: exactly 0 at rho = 1.
+    They are dimensionless. Their squares are the eigenvalues of diag(1/mu_j^2) - rho z z^T with
+    z_j = sqrt(a_j)/mu_j. The smallest comes from prod kappa^2 = (1 - rho) prod 1/mu_j^2: exactly 0
+    at rho = 1.
     """
     _in_unit("albedo", albedo)
     mu_j, a_j = _gauss(order)
@@ -106,7 +110,7 @@ def characteristic_roots(albedo: float, order: int) -> FloatArray:
     # Each factor of the product is near 1, as the roots lie between the poles.
     squares[0] = (1 - albedo) * mu_j[-1] ** -2 * np.prod(mu_j[-2::-1] ** -2 / squares[1:])
     kappa: FloatArray = np.sqrt(squares)
-    kappa.setflags(write=False)  # the cache hands it to everyone
+    kappa.setflags(write=False)  # shared by all callers
     return kappa
 
 

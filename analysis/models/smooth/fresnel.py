@@ -60,12 +60,13 @@ def reflectances(theta: ArrayLike, index: ArrayLike) -> tuple[FloatArray, FloatA
 def polarised(theta: ArrayLike, index: ArrayLike, h: ArrayLike) -> FloatArray:
     """F' = h F'_para + v F'_perp with v = 1 - h: 1991, equations (42) and (43).
 
-    `h` is the part of the energy whose field lies in the plane of incidence: 0 to 1.
-    Raises `ValueError` for an h outside.
+    `theta` in radians, 0 to pi/2; `index` real or complex; `h` the fraction of the energy whose
+    field lies in the plane of incidence; all broadcast. Raises `ValueError` for an h outside 0 to
+    1.
     """
     h = np.asarray(h, dtype=np.float64)
     if not np.all((h >= 0) & (h <= 1)):
-        raise ValueError(f"h = {_first(h, (h >= 0) & (h <= 1)):g}; allowed: 0 to 1")
+        raise ValueError(f"h = {_first_outside(h, (h >= 0) & (h <= 1)):g}; allowed: 0 to 1")
     para, perp = reflectances(theta, index)
     return h * para + (1 - h) * perp
 
@@ -73,7 +74,8 @@ def polarised(theta: ArrayLike, index: ArrayLike, h: ArrayLike) -> FloatArray:
 def unpolarised(theta: ArrayLike, index: ArrayLike) -> FloatArray:
     """F(theta, n) of natural light: 1998, equation (2), which is (42) with h = v = 1/2.
 
-    Defined at theta = 0 too, where (2) as printed is 0/0 (errata). 1 beyond the critical angle.
+    `theta` in radians and `index` broadcast. Defined at theta = 0 too, where (2) as printed is 0/0
+    (errata). 1 beyond the critical angle.
     """
     return polarised(theta, index, 0.5)
 
@@ -81,7 +83,7 @@ def unpolarised(theta: ArrayLike, index: ArrayLike) -> FloatArray:
 def transmittance(theta: ArrayLike, n: ArrayLike) -> FloatArray:
     """1 - F(theta, n) of natural light into a dielectric with real n >= 1, to full precision.
 
-    `theta` is the angle on the outer side, in radians. The same light path backwards has the same
+    `theta`, in radians on the outer side, and `n` broadcast. The reverse light path has the same
     transmittance: 1 - F(theta, n) = 1 - F(asin(sin(theta)/n), 1/n), both factors of 1998 (7).
     """
     c, n, q = _cosines(theta, n)
@@ -91,9 +93,11 @@ def transmittance(theta: ArrayLike, n: ArrayLike) -> FloatArray:
 
 
 def transmittance_gradient(theta: ArrayLike, n: ArrayLike) -> FloatArray:
-    """Derivative of `transmittance` by n. It grows without limit at grazing where n = 1.
+    """Derivative of `transmittance` by n, arguments and shape as there (radians).
 
-    By dq/dn = n/q: d(F_perp)/dn = -2 n c / (q (c + q)^2) and
+    It grows without limit at grazing for n = 1.
+
+    With dq/dn = n/q: d(F_perp)/dn = -2 n c / (q (c + q)^2) and
     d(F_para)/dn = 2 n c (2 q^2 - n^2) / (q (n^2 c + q)^2).
     """
     c, n, q = _cosines(theta, n)
@@ -103,9 +107,9 @@ def transmittance_gradient(theta: ArrayLike, n: ArrayLike) -> FloatArray:
 
 
 def transmittance_gradient_by_cosine(theta: ArrayLike, n: ArrayLike) -> FloatArray:
-    """Derivative of `transmittance` by cos(theta).
+    """Derivative of `transmittance` by cos(theta), arguments and shape as there (radians).
 
-    By dq/dc = c/q: d(F_perp)/dc = 2 (n^2 - 1) / (q (c + q)^2) and
+    With dq/dc = c/q: d(F_perp)/dc = 2 (n^2 - 1) / (q (c + q)^2) and
     d(F_para)/dc = 2 n^2 (n^2 - 1) / (q (n^2 c + q)^2).
     """
     c, n, q = _cosines(theta, n)
@@ -129,9 +133,9 @@ def _chained(
 def wolff_polynomial(theta: ArrayLike, epsilon: float = 0.07) -> FloatArray:
     """Wolff's polynomial for F: 1998, after (7): ((2 theta/pi)^5 + epsilon) / (1 + epsilon).
 
-    `theta` in radians; `epsilon`, which stands for n, 0 or more. It is coarse: with 0.07, against
-    the exact F of n = 1.5, it is 0.025 too high at normal incidence (0.065 for 0.040) and up to
-    0.20 too high, at 79 degrees.
+    `theta` in radians, any shape; `epsilon`, which stands for n, 0 or more. It is coarse: with
+    0.07, against the exact F of n = 1.5, it is 0.025 too high at normal incidence (0.065 for 0.040)
+    and up to 0.20 too high, at 79 degrees.
     """
     if not 0 <= epsilon < np.inf:
         raise ValueError(f"epsilon = {epsilon:g}; allowed: 0 or more")
@@ -143,7 +147,7 @@ def _cosines(theta: ArrayLike, n: ArrayLike) -> tuple[FloatArray, FloatArray, Fl
     """cos(theta), n and q = n cos(theta_t) = sqrt(n^2 - sin^2 theta)."""
     c, n = np.cos(polar("theta", theta)), np.asarray(n, dtype=np.float64)
     if not np.all(n >= 1):
-        raise ValueError(f"n = {_first(n, n >= 1):g}; allowed: 1 or more")
+        raise ValueError(f"n = {_first_outside(n, n >= 1):g}; allowed: 1 or more")
     return c, n, np.sqrt((n - 1) * (n + 1) + c * c)
 
 
@@ -153,11 +157,11 @@ def _squared_modulus(f: ComplexArray) -> FloatArray:
 
 def _checked(index: ArrayLike) -> NDArray[np.complex128]:
     Y = np.asarray(index, dtype=np.complex128)
-    fine = np.isfinite(Y) & (Y.real > 0)
-    if not np.all(fine):
-        raise ValueError(f"index = {Y[~fine].flat[0]}; allowed: finite, real part above 0")
+    allowed = np.isfinite(Y) & (Y.real > 0)
+    if not np.all(allowed):
+        raise ValueError(f"index = {Y[~allowed].flat[0]}; allowed: finite, real part above 0")
     return Y
 
 
-def _first(values: FloatArray, fine: BoolArray) -> float:
-    return float(values[~fine].flat[0])
+def _first_outside(values: FloatArray, allowed: BoolArray) -> float:
+    return float(values[~allowed].flat[0])

@@ -1,10 +1,10 @@
-"""Wolff's diffuse model for smooth dielectrics, and his combination with Oren and Nayar's.
+"""Wolff's diffuse model for smooth dielectrics: subsurface scattering below a Fresnel interface.
 
 What to use when: `wolff` for a smooth or slightly rough dielectric (below about 9 degrees);
-`wolff_oren_nayar` between, from 9 to about 36 degrees; Oren and Nayar's models above.
+`wolff_oren_nayar` from 9 to about 36 degrees; Oren and Nayar's models above.
 
 Source: L. B. Wolff, S. K. Nayar, M. Oren, "Improved Diffuse Reflection Models for Computer
-Vision", International Journal of Computer Vision 30 (1998), sections 2.2 and 4.
+Vision", International Journal of Computer Vision 30 (1998), section 2.2.
 """
 
 from __future__ import annotations
@@ -16,12 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.models.base import Model, Parameter, Validity
-from analysis.models.lambert import ALBEDO
-from analysis.models.rough.oren_nayar_forms import (
-    SIGMA_DEG,
-    roughness_terms,
-    sigma_terms_gradient,
-)
 from analysis.models.smooth.chandrasekhar import (
     h_exact,
     h_order,
@@ -35,7 +29,7 @@ from analysis.models.smooth.fresnel import (
     wolff_polynomial,
 )
 from analysis.models.tanh_rule import W, X
-from analysis.models.validity import GRAZING, NEGATIVE, both_graze, valid_except
+from analysis.models.validity import GRAZING, both_graze, valid_except
 from instrument.geometry import FloatArray, Geometry
 
 SINGLE_SCATTERING_ALBEDO = Parameter(
@@ -43,30 +37,25 @@ SINGLE_SCATTERING_ALBEDO = Parameter(
 )
 N = Parameter("n", "1", 1.0, 3.0, 1.5, starts=(1.2, 1.5, 2.2))
 
-TRANSITION_DEG = (9.0, 36.0)
-"""Roughness between which 1998 (figure 16) sees smooth and rough effects of like size: C1 is ten
-times the upper bound of C2 and C3 at the lower end, twice at the upper one. The authors leave the
-upper end open, between 17 (four times) and 36 degrees."""
-
-# Of K's integrand, poles lie as near to 0 as the critical cosine: from this n on 40 nodes, drawn to
-# 0 where H has a term x ln(x), are enough for 1e-11; below it a rule is taken that minds no poles.
+# K's integrand has poles as near to 0 as the critical cosine: from this n on 40 nodes, clustered at
+# 0 where H has a term x ln(x), are enough for 1e-11; below it the tanh rule is used, which
+# tolerates poles.
 _BEND_INSIDE = 1.00001
-# So many cosines, each counted once, cost less by themselves than a series does to make; more
-# points than this are not looked through for them.
-_FEW_COSINES, _LOOKED_THROUGH = 64, 2048
+# Up to so many distinct cosines, direct evaluation is cheaper than making a series; larger arrays
+# than the second number are not searched for distinct cosines.
+_FEW_COSINES, _SEARCHED = 64, 2048
 
-_TOO_ROUGH = f"rougher than the transition range, which ends at {TRANSITION_DEG[1]:g} degrees"
 _NO_INTERFACE = f"n = 1: {GRAZING}"
 
 
-def _few() -> tuple[FloatArray, FloatArray]:
-    """Gauss-Legendre nodes and weights from 0 to 1, drawn to 0 as the cube."""
+def _clustered() -> tuple[FloatArray, FloatArray]:
+    """Gauss-Legendre nodes and weights from 0 to 1, clustered at 0 by a cube."""
     t, w = np.polynomial.legendre.leggauss(40)
     t = (t + 1) / 2
     return t**3, w / 2 * 3 * t * t
 
 
-_FEW = _few()
+_NODES = _clustered()
 
 
 def wolff_brdf(
@@ -76,18 +65,19 @@ def wolff_brdf(
     epsilon: float | None = None,
     order: int | None = None,
 ) -> FloatArray:
-    """Wolff's BRDF in 1/sr: 1998, equations (7) and (8), over L_i cos(theta_i) d omega.
+    """Wolff's BRDF: 1998, equations (7) and (8), over L_i cos(theta_i) d omega.
 
+    Arguments and result as in `Model.brdf`.
     varrho (1 - F(theta_i, n)) (1 - F(asin(sin(theta_r)/n), 1/n)) with varrho = varrho_1/(1 - K).
-    rho is the part of the light that a scatterer inside does not absorb, n the index of the
+    rho is the fraction of the light that a scatterer inside does not absorb, n the index of the
     material. F and H exact; relative error below 1e-10. Never negative; the same at every
     azimuth. At n = 1 it is Chandrasekhar's law for a bare half-space. With an `epsilon` both F of
     (7), of theta_i and theta_r, are Wolff's polynomial (0.07 for most dielectrics; at n = 1.5
     that is 5 % darker at normal incidence, 12 % at 50/50 and 35 % at 70/70 degrees); varrho keeps
     the exact one. With an `order` every H, in K too, is Chandrasekhar's of that order.
 
-    Not quite reciprocal, as K depends on theta_r alone (errata). Largest difference between the
-    two ways round, over all angles, at normal against grazing: for n = 1.5 it is 1.5 % at
+    Not quite reciprocal, as K depends on theta_r alone (errata). Largest difference on exchange of
+    lamp and camera, over all angles, at normal against grazing: for n = 1.5 it is 1.5 % at
     rho = 0.5, 4.3 % at 0.9, 5.1 % at 0.98 and 2.4 % at 1; over all rho 5.6 % at n = 1.2 and 1.3,
     3.7 % at n = 2, and none at n = 1. For the same reason diffuse and mirror reflection together
     exceed 1 at rho = 1, by up to 1.3 % (n = 1.2, normal incidence; 1.0 % for n = 1.5).
@@ -96,15 +86,15 @@ def wolff_brdf(
     mu = _both_refracted(geometry, n)
     H, K = _h_and_k(mu, rho, n, order)
     varrho_1 = rho / (4 * np.pi * n * n) * H[0] * H[1] / (mu[0] + mu[1])
-    return np.asarray(varrho_1 / (1 - K[1]) * _both_transmittances(geometry, n, epsilon))
+    return np.asarray(varrho_1 / (1 - K[1]) * both_transmittances(geometry, n, epsilon))
 
 
 def wolff_gradient(
     geometry: Geometry, single_scattering_albedo: float, n: float
 ) -> dict[str, FloatArray]:
-    """Derivatives of `wolff_brdf` by rho and by n, under the integrals.
+    """Derivatives of `wolff_brdf` by rho and n, under the integrals. As in `Model.gradient`.
 
-    That by rho grows without limit as 1/sqrt(1 - rho): at rho = 1 the value of 1 - 1e-12 is given.
+    That by rho grows without limit as 1/sqrt(1 - rho): at rho = 1 that of 1 - 1e-12 is returned.
     """
     rho = single_scattering_albedo
     mu = _both_refracted(geometry, n)
@@ -112,9 +102,9 @@ def wolff_gradient(
     dlog_H, dK = _h_and_k_gradient(mu, min(rho, 1 - 1e-12), n)
     per_rho = H[0] * H[1] / (4 * np.pi * n * n * (mu[0] + mu[1]) * (1 - K[1]))
     growth = 1 + rho * (dlog_H[0] + dlog_H[1] + dK[1] / (1 - K[1]))
-    transmitted = _both_transmittances(geometry, n)
+    transmitted = both_transmittances(geometry, n)
     growth_by_n = _growth_by_n(mu, K[1], rho, n)
-    by_n = rho * per_rho * (growth_by_n * transmitted + _both_transmittances_gradient(geometry, n))
+    by_n = rho * per_rho * (growth_by_n * transmitted + both_transmittances_gradient(geometry, n))
     return {
         "single_scattering_albedo": np.asarray(per_rho * transmitted * growth),
         "n": np.asarray(by_n),
@@ -130,7 +120,7 @@ def _growth_by_n(mu: FloatArray, K: FloatArray, rho: float, n: float) -> FloatAr
 
 
 def wolff_validity(geometry: Geometry, single_scattering_albedo: float, n: float) -> Validity:
-    """Everywhere, but for a bare half-space (n = 1) with lamp and camera both grazing."""
+    """Valid unless n = 1 (a bare half-space) and both directions graze. As in `Model.brdf`."""
     scatters = single_scattering_albedo > 0
     return valid_except(geometry, (both_graze(geometry) & scatters & (n == 1), _NO_INTERFACE))
 
@@ -138,7 +128,7 @@ def wolff_validity(geometry: Geometry, single_scattering_albedo: float, n: float
 def ray_terms(
     theta: FloatArray, single_scattering_albedo: float, n: float, order: int | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """H and 1 - K along rays at `theta` outside (a vector, radians): what varrho is made of.
+    """H and 1 - K, the factors of varrho, along rays at `theta` outside ((N,), radians).
 
     With an `order` H is Chandrasekhar's of that order, in K too.
     """
@@ -149,11 +139,11 @@ def ray_terms(
 def internal_return(
     mu_ref: FloatArray, single_scattering_albedo: float, n: float, order: int | None = None
 ) -> FloatArray:
-    """K of 1998 (8): light that the interface sends back inside and that is scattered again.
+    """K of 1998 (8): light reflected back inside by the interface and scattered again.
 
     K = int_0^{pi/2} F(phi', 1/n) C_rho(cos phi', mu_ref) 2 pi sin(phi') dphi', with (errata)
-    C_rho(x, y) = rho/(4 pi) x/(x + y) H(x) H(y), and F = 1 beyond the critical angle. `mu_ref` is
-    the cosine inside, a vector. Below 1, and 0 for n = 1.
+    C_rho(x, y) = rho/(4 pi) x/(x + y) H(x) H(y), and F = 1 beyond the critical angle. `mu_ref`,
+    (N,), is the cosine inside. The result, (N,), is below 1, and 0 for n = 1.
     """
     rho = single_scattering_albedo
     x, weight = _inside(rho, n, order)
@@ -176,7 +166,7 @@ def _internal_return_gradient(mu_ref: FloatArray, rho: float, n: float) -> Float
 def _h_and_k(
     mu: FloatArray, rho: float, n: float, order: int | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """H(mu) and K(mu); those of few cosines, as a scan has, straight, of many by series."""
+    """H(mu) and K(mu): of few cosines, as a scan has, computed directly; of many, by series."""
     few = _few_cosines(mu)
     if few is not None:
         cosines, place = few
@@ -198,8 +188,8 @@ def _h_and_k_gradient(mu: FloatArray, rho: float, n: float) -> tuple[FloatArray,
 
 
 def _few_cosines(mu: FloatArray) -> tuple[FloatArray, NDArray[np.intp]] | None:
-    """The different cosines and the place of each of `mu` among them, if they are few."""
-    if mu.size > _LOOKED_THROUGH:
+    """Distinct cosines and the index of each `mu` among them; None where they are many."""
+    if mu.size > _SEARCHED:
         return None
     cosines, place = np.unique(mu, return_inverse=True)
     return (cosines, place.reshape(mu.shape)) if cosines.size <= _FEW_COSINES else None
@@ -211,7 +201,7 @@ def _internal_return_by_n(mu_ref: FloatArray, rho: float, n: float) -> FloatArra
     x dx = c dc/n^2 with c = sqrt(1 - n^2 (1 - x^2)) the cosine outside, -dc/dn = (1 - c^2)/(n c);
     the end at the critical angle adds nothing, as F = 1 on both sides of it.
     """
-    c, weight = _FEW if n >= _BEND_INSIDE else (X, W)
+    c, weight = _NODES if n >= _BEND_INSIDE else (X, W)
     sin2 = (1 - c) * (1 + c)
     outside = np.arccos(c)
     dF = c * transmittance_gradient(outside, n)
@@ -231,23 +221,23 @@ def _h_and_k_series(rho: float, n: float, order: int | None = None) -> FloatArra
 @lru_cache(maxsize=64)
 def _h_and_k_gradient_series(rho: float, n: float) -> FloatArray:
     mu, to_series = _chebyshev(n)
-    slopes = [log_h_gradient(mu, rho), _internal_return_gradient(mu, rho, n)]
-    return np.asarray(to_series @ np.stack(slopes, axis=1))
+    gradients = [log_h_gradient(mu, rho), _internal_return_gradient(mu, rho, n)]
+    return np.asarray(to_series @ np.stack(gradients, axis=1))
 
 
 def _h_and_k_by_n(mu: FloatArray, rho: float, n: float) -> tuple[FloatArray, FloatArray]:
     """Derivatives of ln H(mu) and K(mu) by n along a ray, whose mu changes with n."""
     few = _few_cosines(mu)
     if few is not None:
-        dlog_H, dK = _of_few_by_n(few[0], rho, n)
+        dlog_H, dK = _direct_by_n(few[0], rho, n)
         return dlog_H[few[1]], dK[few[1]]
     log_H, K, by_n = _evaluate(_h_and_k_by_n_series(rho, n), mu, n)
     d_log_mu = (1 / (mu * mu) - 1) / n
     return log_H * d_log_mu, K * d_log_mu + by_n
 
 
-def _of_few_by_n(mu: FloatArray, rho: float, n: float) -> tuple[FloatArray, FloatArray]:
-    """`_h_and_k_by_n` of a vector of few cosines, straight."""
+def _direct_by_n(mu: FloatArray, rho: float, n: float) -> tuple[FloatArray, FloatArray]:
+    """`_h_and_k_by_n` of a few cosines (N,), without a series."""
     H, dlog_H = h_exact(mu, rho), log_h_gradient_by_mu(mu, rho)
     x, weight = _inside(rho, n)
     inverse = 1 / (x + mu[:, np.newaxis])
@@ -301,7 +291,7 @@ def _inside(rho: float, n: float, order: int | None = None) -> tuple[FloatArray,
     outside: there F(phi', 1/n) = F(c, n) is smooth, which in x it is not.
     """
     critical = math.sqrt((n - 1) * (n + 1)) / n
-    t, dt = _FEW if n >= _BEND_INSIDE else (X, W)
+    t, dt = _NODES if n >= _BEND_INSIDE else (X, W)
     outside = np.arccos(t)
     x = np.concatenate([critical * t, _refracted(outside, n)])
     F_x_dx = np.concatenate(
@@ -321,10 +311,11 @@ def _both_refracted(geometry: Geometry, n: float) -> FloatArray:
     return np.stack([_refracted(geometry.theta_i, n), _refracted(geometry.theta_r, n)])
 
 
-def _both_transmittances(geometry: Geometry, n: float, epsilon: float | None = None) -> FloatArray:
+def both_transmittances(geometry: Geometry, n: float, epsilon: float | None = None) -> FloatArray:
     """(1 - F(theta_i, n)) (1 - F(asin(sin(theta_r)/n), 1/n)): the way in and the way out.
 
-    The way out transmits as the way in from theta_r; with an `epsilon` by the polynomial.
+    Dimensionless, of the geometry's shape. The way out transmits like the way in from theta_r. With
+    an `epsilon` by Wolff's polynomial.
     """
     if epsilon is None:
         return transmittance(geometry.theta_i, n) * transmittance(geometry.theta_r, n)
@@ -332,71 +323,11 @@ def _both_transmittances(geometry: Geometry, n: float, epsilon: float | None = N
     return (1 - F_i) * (1 - F_r)
 
 
-def _both_transmittances_gradient(geometry: Geometry, n: float) -> FloatArray:
-    """Derivative of the two, exact, by n."""
+def both_transmittances_gradient(geometry: Geometry, n: float) -> FloatArray:
+    """Derivative of the exact `both_transmittances` by n. As in `Model.gradient`."""
     T_i, T_r = transmittance(geometry.theta_i, n), transmittance(geometry.theta_r, n)
     dT_i, dT_r = (transmittance_gradient(t, n) for t in (geometry.theta_i, geometry.theta_r))
     return T_r * dT_i + T_i * dT_r
 
 
-def wolff_oren_nayar_brdf(
-    geometry: Geometry, albedo: float, sigma_deg: float, n: float, epsilon: float | None = None
-) -> FloatArray:
-    """Smooth and rough combined, in 1/sr: 1998, equation (3) with C1 of (9), over L_i cos(theta_i).
-
-    C2 and C3 as in (3), no interreflection (4). `sigma_deg` is the standard deviation of the
-    facets' slope angle. Reciprocal. At sigma = 0 it is (7) with varrho = albedo/pi; at n = 1 it
-    is (3). With an `epsilon` both F of C1 are Wolff's polynomial. As printed it is negative far
-    forward, where C1 vanishes and C2 does not.
-    """
-    sigma2 = math.radians(sigma_deg) ** 2
-    C1 = (1 - 0.5 * sigma2 / (sigma2 + 0.33)) * _both_transmittances(geometry, n, epsilon)
-    rough = sigma2 / (sigma2 + 0.09) * roughness_terms(geometry)
-    return np.asarray((albedo / np.pi) * (C1 + rough))
-
-
-def wolff_oren_nayar_gradient(
-    geometry: Geometry, albedo: float, sigma_deg: float, n: float
-) -> dict[str, FloatArray]:
-    """Derivatives of `wolff_oren_nayar_brdf` by albedo, by sigma in 1/degree, and by n."""
-    sigma2 = math.radians(sigma_deg) ** 2
-    T, dT = _both_transmittances(geometry, n), _both_transmittances_gradient(geometry, n)
-    dC1, d_rough = sigma_terms_gradient(sigma_deg)
-    return {
-        "albedo": wolff_oren_nayar_brdf(geometry, 1.0, sigma_deg, n),
-        "sigma_deg": (albedo / np.pi) * (dC1 * T + d_rough * roughness_terms(geometry)),
-        "n": (albedo / np.pi) * (1 - 0.5 * sigma2 / (sigma2 + 0.33)) * dT,
-    }
-
-
-def wolff_oren_nayar_validity(
-    geometry: Geometry, albedo: float, sigma_deg: float, n: float
-) -> Validity:
-    """Up to the end of the transition range, where the formula is neither negative nor endless."""
-    del albedo  # where it holds does not depend on it
-    return valid_except(
-        geometry,
-        (sigma_deg > TRANSITION_DEG[1], _TOO_ROUGH),
-        (wolff_oren_nayar_brdf(geometry, 1.0, sigma_deg, n) < 0, NEGATIVE),
-        (both_graze(geometry) & (sigma_deg > 0), GRAZING),
-    )
-
-
-def roughness_share(sigma_deg: float) -> float:
-    """Upper bound of C2 and C3 over C1 at normal incidence without an interface: 1998, figure 16.
-
-    0.45 sigma^2/(sigma^2 + 0.09) / (1 - 0.5 sigma^2/(sigma^2 + 0.33)): 1/100, 1/20, 1/10 near
-    2.5, 6 and 9 degrees, and 1/4, 1/3, 1/2 near 17, 22 and 36 degrees.
-    """
-    sigma2 = math.radians(sigma_deg) ** 2
-    return 0.45 * sigma2 / (sigma2 + 0.09) / (1 - 0.5 * sigma2 / (sigma2 + 0.33))
-
-
 WOLFF = Model("wolff", (SINGLE_SCATTERING_ALBEDO, N), wolff_brdf, wolff_gradient, wolff_validity)
-WOLFF_OREN_NAYAR = Model(
-    "wolff_oren_nayar",
-    (ALBEDO, SIGMA_DEG, N),
-    wolff_oren_nayar_brdf,
-    wolff_oren_nayar_gradient,
-    wolff_oren_nayar_validity,
-)

@@ -1,8 +1,8 @@
-"""Beckmann and Spizzichino's physical optics: a lobe and a coherent spike, from height and length.
+"""Beckmann and Spizzichino's physical optics: lobe and coherent spike of a random height field.
 
-What to use when: `lobe_brdf` (the model `beckmann_spizzichino`) holds for any roughness;
+What to use when: `lobe_brdf` (the model `beckmann_spizzichino`) for any roughness;
 `smooth_lobe_brdf` and `rough_lobe_brdf` are the paper's limits, to compare with. `spike_brdf` is
-what a perfect mirror becomes; `roughness` says which of the two counts.
+the mirror reflection that remains; `surface_statistics` says which of the two dominates.
 
 Lengths (`sigma_h`, `correlation_length`, footprints) are in wavelengths, so that k = 2π. The
 surface is a perfect conductor; nothing masks or shadows; light bounces once.
@@ -47,13 +47,14 @@ Weight = Callable[..., FloatArray]  # of m, g and q
 def lobe_brdf(
     geometry: Geometry, scale: float, sigma_h: float, correlation_length: float
 ) -> FloatArray:
-    """The lobe in 1/sr for any roughness: 1991, (77) over (80), scale f with
+    """The lobe for any roughness: 1991, (77) over (80), scale f. As in `Model.brdf`, with
 
     f = (cosθ_i/cosθ_r) π T² D² e^{-g} Σ_{m≥1} g^m/(m! m) e^{-v_xy² T²/4m}.
 
     Never negative; reciprocal, as D holds a 1/cosθ_i. Accurate to 1e-9 (found: 3e-11) down to
     1e-280/sr, for g from 0 to 1.6e6, at a cost that does not grow with g. Lobe and spike of a
-    surface with long waves reflect 1 - e^{-g} and e^{-g} of the light, times `scale`. Diverges as
+    surface with a long correlation length reflect 1 - e^{-g} and e^{-g} of the light, times
+    `scale`. Diverges as
     1/cosθ at grazing, as printed.
     """
     g, q = optical_roughness(geometry, sigma_h), lobe_exponent(geometry, correlation_length)
@@ -63,7 +64,7 @@ def lobe_brdf(
 def lobe_gradient(
     geometry: Geometry, scale: float, sigma_h: float, correlation_length: float
 ) -> dict[str, FloatArray]:
-    """Derivatives of `lobe_brdf` by its parameters, in 1/sr per unit of each: sums over m again."""
+    """Derivatives of `lobe_brdf` by its parameters, sums over m again. As in `Model.gradient`."""
     g, q = optical_roughness(geometry, sigma_h), lobe_exponent(geometry, correlation_length)
     factor = lobe_factor(geometry, correlation_length)
     by_ln_g = poisson_sum(g, q, lambda m, g, _: (m - g) / m)
@@ -79,7 +80,10 @@ def lobe_gradient(
 def lobe_validity(
     geometry: Geometry, scale: float, sigma_h: float, correlation_length: float
 ) -> Validity:
-    """Where nothing is shadowed to speak of, on a surface that curves little in a wavelength."""
+    """Valid where shadowing is negligible and the radius of curvature exceeds a wavelength.
+
+    Arguments as in `Model.brdf`.
+    """
     del scale
     limit_deg = unshadowed_deg(sigma_h, correlation_length)
     larger_deg = np.maximum(geometry.theta_i_deg, geometry.theta_r_deg)
@@ -98,7 +102,7 @@ def lobe_validity(
 def smooth_lobe_brdf(
     geometry: Geometry, scale: float, sigma_h: float, correlation_length: float
 ) -> FloatArray:
-    """The lobe in 1/sr for g ≪ 1: 1991, (78) over (80), the first term of the sum."""
+    """The lobe for g ≪ 1: 1991, (78) over (80), first term of the sum. As in `Model.brdf`."""
     g, q = optical_roughness(geometry, sigma_h), lobe_exponent(geometry, correlation_length)
     with np.errstate(under="ignore"):
         return scale * lobe_factor(geometry, correlation_length) * g * np.exp(-g - q)
@@ -107,7 +111,7 @@ def smooth_lobe_brdf(
 def rough_lobe_brdf(
     geometry: Geometry, scale: float, sigma_h: float, correlation_length: float
 ) -> FloatArray:
-    """The lobe in 1/sr for g ≫ 1: 1991, (79) over (80). `sigma_h` is above 0.
+    """The lobe for g ≫ 1: 1991, (79) over (80), `sigma_h` above 0. As in `Model.brdf`.
 
     With tan α₀ = 2σ_h/T it is geometrical optics: scale P/(4 cosθ_i cosθ_r), P the density
     exp(-tan²α/tan²α₀)/(π tan²α₀ cos⁴α) of mirrors, so that `scale` is a Fresnel factor.
@@ -126,9 +130,9 @@ def spike_brdf(
     X: FloatArray | float,
     Y: FloatArray | float,
 ) -> FloatArray:
-    """The coherent spike in 1/sr: 1991, the first term of (77) over (80), scale f with
+    """The coherent spike: 1991, first term of (77) over (80), scale f. As in `Model.brdf`, with
 
-    f = (cosθ_i/cosθ_r) A e^{-g} ρ₀², A = 4XY the area that the pixel sees (`patch_of_pixel`).
+    f = (cosθ_i/cosθ_r) A e^{-g} ρ₀², A = 4XY the area imaged by the pixel (`patch_of_pixel`).
 
     `X`, `Y` are half its sides in wavelengths, X in the plane of incidence. Reciprocal in the
     mirror direction only: cosθ_i/cosθ_r is not. In all it reflects scale e^{-g} of the light.
@@ -138,16 +142,16 @@ def spike_brdf(
 
 
 def optical_roughness(geometry: Geometry, sigma_h: float) -> FloatArray:
-    """g: 1991, equation (19)."""
+    """g, dimensionless, of the geometry's shape: 1991, equation (19)."""
     check_lengths(sigma_h)
     return np.square(K * sigma_h * (np.cos(geometry.theta_i) + np.cos(geometry.theta_r)))
 
 
 def wave_vector(geometry: Geometry) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """v_x, v_y, v_z in 1/wavelength: 1991, (16), the scan's damage mended.
+    """v_x, v_y, v_z in 1/wavelength, of the geometry's shape: 1991, (16), garbled in the scan.
 
-    v = k (sinθ_i - sinθ_r cosφ_r, sinθ_r sinφ_r, -cosθ_i - cosθ_r). v_x in a form in which
-    nothing cancels near the mirror direction.
+    v = k (sinθ_i - sinθ_r cosφ_r, sinθ_r sinφ_r, -cosθ_i - cosθ_r). v_x is written so that nothing
+    cancels near the mirror direction.
     """
     x, y = np.sin(geometry.theta_i), np.sin(geometry.theta_r)
     half = np.radians(geometry.dphi_deg) / 2
@@ -157,20 +161,23 @@ def wave_vector(geometry: Geometry) -> tuple[FloatArray, FloatArray, FloatArray]
 
 
 def geometric_factor(geometry: Geometry) -> FloatArray:
-    """D: 1991, (21), with 1 + cosθ_i cosθ_r - sinθ_i sinθ_r cosφ_r = v²/2k²."""
+    """D: 1991, (21), with 1 + cosθ_i cosθ_r - sinθ_i sinθ_r cosφ_r = v²/2k².
+
+    Dimensionless, of the geometry's shape.
+    """
     cos_i = np.cos(geometry.theta_i)
     along = cos_i + np.cos(geometry.theta_r)
     return np.asarray((off_mirror2(geometry) + along * along) / (2 * cos_i * along))
 
 
 def lobe_exponent(geometry: Geometry, correlation_length: float) -> FloatArray:
-    """q = v_xy² T²/4, so that a term of the sum has e^{-q/m}."""
+    """q = v_xy² T²/4, dimensionless, of the geometry's shape: a term of the sum has e^{-q/m}."""
     check_lengths(0.0, correlation_length)
     return (K * correlation_length) ** 2 / 4 * off_mirror2(geometry)
 
 
 def lobe_factor(geometry: Geometry, correlation_length: float) -> FloatArray:
-    """(cosθ_i/cosθ_r) π T² D² in 1/sr."""
+    """(cosθ_i/cosθ_r) π T² D² in 1/sr, of the geometry's shape: the factor before the sum."""
     ratio = np.cos(geometry.theta_i) / np.cos(geometry.theta_r)
     D = geometric_factor(geometry)
     return math.pi * correlation_length**2 * ratio * np.square(D)
@@ -202,12 +209,13 @@ def _per_m(m: FloatArray, *_: FloatArray) -> FloatArray:
 def poisson_sum(g: FloatArray, q: FloatArray, weight: Weight) -> FloatArray:
     """e^{-g} Σ_{m≥1} g^m/m! w(m) e^{-q/m}, element by element; w is smooth, as 1/m is in (18).
 
-    Where the largest term lies below m = 40, term by term (up to 110 of them, each from the one
-    before it: nothing overflows). Beyond, the summand is a smooth bell of width s ≥ 1: by
-    Poisson's summation formula its sum over integers and its sum in steps of h, times h, both are
-    its integral but for e^{-2π²(s/h)²}. 24 nodes, 0.75 s apart, then are enough at any g; where s
-    is so narrow that h would be below 1, h = 1 is the sum itself. Largest relative error against
-    sums of 25 digits: 2e-11 (g 18, q 1400: a lopsided bell).
+    `g` and `q`, dimensionless, broadcast to the result's shape. A largest term below m = 40: summed
+    term by term (up to 110 of them, each from the one before it, without overflow). Beyond, the
+    summand is a smooth bell of width s ≥ 1: by Poisson's summation formula its sum over integers
+    and its sum in steps of h, times h, both are its integral but for e^{-2π²(s/h)²}. 24 nodes,
+    0.75 s apart, then are enough at any g; where s is so narrow that h would be below 1, h = 1 is
+    the sum itself. Largest relative error against sums of 25 digits: 2e-11 (g 18, q 1400: a skewed
+    bell).
     """
     g, q = np.broadcast_arrays(g, q)
     flat_g, flat_q = g.ravel(), q.ravel()
@@ -233,7 +241,7 @@ def _block(g: FloatArray, q: FloatArray, weight: Weight) -> FloatArray:
 
 
 def largest_term(g: FloatArray, q: FloatArray) -> FloatArray:
-    """The m, not rounded, near which g^m/m! e^{-q/m} is largest: m² ln(m/g) = q.
+    """The m, not rounded, near which g^m/m! e^{-q/m} is largest: m² ln(m/g) = q, any shape.
 
     m = g e^{W/2} with W e^W = 2q/g² (Lambert's W): a start good to 2 % and two steps of
     R. Iacono, J. P. Boyd, Advances in Computational Mathematics 43 (2017), good to 1e-9.
@@ -265,16 +273,16 @@ def _in_wide_steps(g: FloatArray, q: FloatArray, peak: FloatArray, weight: Weigh
     middle = np.rint(peak)
     total = np.zeros(g.shape)
     for step in range(-LEFT, RIGHT + 1):
-        m = np.maximum(middle + step * h, 0.5)  # nothing is left so far down
+        m = np.maximum(middle + step * h, 0.5)  # terms so far down are negligible
         total += poisson_term(m, g) * np.exp(-q / m) * weight(m, g, q)
     return h * total
 
 
 def poisson_term(m: FloatArray, g: FloatArray) -> FloatArray:
-    """e^{-g} g^m/m! for m not whole and above 10, to 1e-13 and the rounding of m - g.
+    """e^{-g} g^m/m! for real m above 10, to 1e-13 and the rounding of m - g; `m`, `g` broadcast.
 
-    By Stirling's series for m!, and g - m + m ln(m/g) = g ((1+d) ln(1+d) - d) with m = g (1+d):
-    the exponents, which are as large as m ln g, never stand alone.
+    Dimensionless. By Stirling's series for m!, and g - m + m ln(m/g) = g ((1+d) ln(1+d) - d) with
+    m = g (1+d): the exponents, which are as large as m ln g, never stand alone.
     """
     d = (m - g) / g
     r = 1 / m

@@ -1,9 +1,8 @@
-"""GGX: mirror facets with Trowbridge and Reitz's distribution, whose tails are long.
+"""GGX: mirror facets with the long-tailed slope distribution of Trowbridge and Reitz.
 
 What to use when: `ggx` for a glossy lobe with a wide halo, or a comparison with renderers;
-`ggx_f90` for measured surfaces whose gloss does not rise to 1 at grazing, or rises higher, as that
-of coated, woven or layered ones does. Torrance and Sparrow's (`specular.py`) is the papers' own
-lobe.
+`ggx_f90` for measured surfaces whose gloss at grazing stays below 1 or exceeds it, as that of
+coated, woven or layered ones does. The papers' own lobe is `torrance_sparrow`.
 
 Sources: T. S. Trowbridge, K. P. Reitz, Journal of the Optical Society of America 65 (1975); B.
 Walter, S. R. Marschner, H. Li, K. E. Torrance, "Microfacet Models for Refraction through Rough
@@ -31,7 +30,7 @@ F90 = Parameter("f90", "1", 0.0, 10.0, 1.0, scale=True)
 
 
 def ggx_brdf(geometry: Geometry, f0: float, alpha: float) -> FloatArray:
-    """GGX BRDF in 1/sr: F G2 D / (4 cos_i cos_r).
+    """GGX BRDF: F G2 D / (4 cos_i cos_r). Arguments and result as in `Model.brdf`.
 
     F = f0 + (1 - f0)(1 - cos theta')^5 (Schlick's), theta' from the half-vector to the lamp;
     D = alpha^2 / (pi (alpha^2 cos_a^2 + sin_a^2)^2), theta_a the half-vector's angle;
@@ -46,7 +45,7 @@ def ggx_brdf(geometry: Geometry, f0: float, alpha: float) -> FloatArray:
 
 
 def ggx_gradient(geometry: Geometry, f0: float, alpha: float) -> dict[str, FloatArray]:
-    """Derivatives of `ggx_brdf` by f0 and by alpha."""
+    """Derivatives of `ggx_brdf` by f0 and by alpha. As in `Model.gradient`."""
     cos2_a, cos_half, D, visibility = _factors(geometry, alpha)
     schlick = np.power(1 - cos_half, 5)
     c_i, c_r = np.cos(geometry.theta_i), np.cos(geometry.theta_r)
@@ -63,10 +62,10 @@ def ggx_gradient(geometry: Geometry, f0: float, alpha: float) -> dict[str, Float
 
 
 def ggx_f90_brdf(geometry: Geometry, f0: float, f90: float, alpha: float) -> FloatArray:
-    """As `ggx_brdf`, in 1/sr, with F = f0 + (f90 - f0)(1 - cos theta')^5.
+    """As `ggx_brdf`, with F = f0 + (f90 - f0)(1 - cos theta')^5.
 
-    f0 and f90 are the lobe's strengths at normal incidence and at grazing. Above 1 more light may
-    leave than comes. Never negative; reciprocal.
+    Arguments and result as in `Model.brdf`. f0 and f90 are the lobe's strengths at normal incidence
+    and at grazing. Above 1 more light may leave than arrives. Never negative; reciprocal.
     """
     _, cos_half, D, visibility = _factors(geometry, alpha)
     F = f0 + (f90 - f0) * np.power(1 - cos_half, 5)
@@ -76,7 +75,7 @@ def ggx_f90_brdf(geometry: Geometry, f0: float, f90: float, alpha: float) -> Flo
 def ggx_f90_gradient(
     geometry: Geometry, f0: float, f90: float, alpha: float
 ) -> dict[str, FloatArray]:
-    """Derivatives of `ggx_f90_brdf` by f0, f90 and alpha."""
+    """Derivatives of `ggx_f90_brdf` by f0, f90 and alpha. As in `Model.gradient`."""
     mirrors = ggx_gradient(geometry, 1.0, alpha)["alpha"]  # of facets that reflect all light
     _, cos_half, D, visibility = _factors(geometry, alpha)
     schlick = np.power(1 - cos_half, 5)
@@ -88,8 +87,8 @@ def ggx_f90_gradient(
 
 
 def ggx_f90_validity(geometry: Geometry, f0: float, f90: float, alpha: float) -> Validity:
-    """Where facets reflect no more than they receive, and not where both directions graze."""
-    del alpha  # the limits are the geometry's and those of the strengths
+    """Valid for f0 and f90 up to 1, unless both directions graze. Arguments as in `Model.brdf`."""
+    del alpha  # validity does not depend on it
     return valid_except(
         geometry,
         (both_graze(geometry), GRAZING),
@@ -98,8 +97,8 @@ def ggx_f90_validity(geometry: Geometry, f0: float, f90: float, alpha: float) ->
 
 
 def ggx_validity(geometry: Geometry, f0: float, alpha: float) -> Validity:
-    """Everywhere but where lamp and camera both graze the surface."""
-    del f0, alpha  # the limit is the geometry's
+    """Valid unless lamp and camera both graze the surface. Arguments as in `Model.brdf`."""
+    del f0, alpha  # validity does not depend on them
     return valid_except(geometry, (both_graze(geometry), GRAZING))
 
 

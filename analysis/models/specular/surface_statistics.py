@@ -1,11 +1,11 @@
-"""Roughness as height and as slope: how the two are linked, and what each allows.
+"""Statistics of a random height field: slopes from heights, and which components are visible.
 
 Lengths are in wavelengths: `sigma_h` is the standard deviation of the surface's height, normally
 distributed, `correlation_length` the T of its autocorrelation exp(-tau^2 / T^2).
 
 Source: S. K. Nayar, K. Ikeuchi, T. Kanade, IEEE Transactions on Pattern Analysis and Machine
-Intelligence 13 (1991), sections II and IV. The thresholds are what its authors saw in their
-diagrams; they stated no tolerance.
+Intelligence 13 (1991), sections II and IV. The authors read the thresholds off their
+diagrams and stated no tolerance. `has_lobe` to `has_gaussian_lobe` are library only.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ GAUSSIAN_LOBE = 0.05  # sigma_h / T: below it, the lobe is a Gaussian on the mir
 
 
 def slope_sigma_deg(sigma_h: float, correlation_length: float) -> float:
-    """sigma_alpha in degrees of the Gaussian slopes that scatter alike: 1991, equation (60).
+    """sigma_alpha in degrees of the equivalent Gaussian slopes: 1991, equation (60).
 
-    sigma_alpha = atan(2 sigma_h / T) / sqrt(2). It takes tan(alpha) for alpha, so it is good for
-    gentle slopes; at 1/e of their peaks the two lobes agree however rough the surface is.
+    sigma_alpha = atan(2 sigma_h / T) / sqrt(2). It replaces alpha by tan(alpha), so it is good for
+    gentle slopes; at 1/e of their peaks the two lobes agree at any roughness.
     """
     return math.degrees(math.atan(slope_scale(sigma_h, correlation_length))) / math.sqrt(2)
 
 
 def height_over_length(sigma_deg: float) -> float:
-    """sigma_h / T of the surface whose slopes are `sigma_deg` wide: (60) solved for it.
+    """sigma_h / T of the surface with slopes of standard deviation `sigma_deg`: inverse of (60).
 
     Raises `ValueError` outside 0 to 90 / sqrt(2) = 63.6 degrees, where (60) ends.
     """
@@ -44,25 +44,25 @@ def slope_scale(sigma_h: float, correlation_length: float) -> float:
 
 
 def has_lobe(sigma_h: float) -> bool:
-    """Whether the lobe counts: sigma_h of 0.025 wavelengths or more."""
+    """Return True if the lobe is visible: sigma_h of 0.025 wavelengths or more."""
     check_lengths(sigma_h)
     return sigma_h >= SPIKE_ONLY
 
 
 def has_spike(sigma_h: float) -> bool:
-    """Whether the spike counts, away from grazing: sigma_h up to 1.5 wavelengths."""
+    """Return True if the spike is visible away from grazing: sigma_h up to 1.5 wavelengths."""
     check_lengths(sigma_h)
     return sigma_h <= NO_SPIKE
 
 
 def has_spike_like_lobe(sigma_h: float, correlation_length: float) -> bool:
-    """Whether the lobe itself looks like a spike: sigma_h / T below 0.02."""
+    """Return True if the lobe itself looks like a spike: sigma_h / T below 0.02."""
     check_lengths(sigma_h, correlation_length)
     return sigma_h / correlation_length < SPIKE_LIKE_LOBE
 
 
 def has_gaussian_lobe(sigma_h: float, correlation_length: float) -> bool:
-    """Whether the lobe is a Gaussian about the mirror direction: sigma_h / T below 0.05.
+    """Return True if the lobe is a Gaussian about the mirror direction: sigma_h / T below 0.05.
 
     Rougher surfaces have their peak beyond the mirror direction.
     """
@@ -84,17 +84,17 @@ def curvature_radius(sigma_h: float, correlation_length: float) -> float:
 
 
 def unshadowed_deg(sigma_h: float, correlation_length: float) -> float:
-    """Largest angle from the normal, in degrees, with next to no shadow: 90 - alpha_0.
+    """Largest angle from the normal, in degrees, with negligible shadowing: 90 - alpha_0.
 
     There cot(theta) = tan(alpha_0) = 2 sigma_h / T, and Smith's shadowing of a Gaussian surface
     (IEEE Transactions on Antennas and Propagation 15, 1967) is
-    Λ = (e^-1 / sqrt(pi) - erfc(1)) / 2 = 0.025: 2.5 % of the facets are out of sight.
+    Λ = (e^-1 / sqrt(pi) - erfc(1)) / 2 = 0.025: 2.5 % of the facets are hidden.
     """
     return 90 - math.degrees(math.atan(slope_scale(sigma_h, correlation_length)))
 
 
 def check_lengths(sigma_h: float, correlation_length: float = 1.0) -> None:
-    """Raise `ValueError` for a height below 0 or a length not above it (wavelengths)."""
+    """Raise `ValueError` for a height below 0 or a length of 0 or less (wavelengths)."""
     if not 0 <= sigma_h < math.inf:
         raise ValueError(f"sigma_h = {sigma_h:g} wavelengths; allowed: 0 or more")
     if not 0 < correlation_length < math.inf:

@@ -6,7 +6,7 @@ Fresnel factor, for polarised light, or with another density of facets than the 
 
 Sources: K. E. Torrance, E. M. Sparrow, Journal of the Optical Society of America 57 (1967), in
 the form of Oren and Nayar 1995, equation (37), with the 1/4 and the irradiance that it leaves to
-k_s put back: our ks is a Fresnel factor, theirs divided by 4 is ours. S. K. Nayar, K. Ikeuchi,
+k_s restored: our ks is a Fresnel factor, theirs divided by 4 is ours. S. K. Nayar, K. Ikeuchi,
 T. Kanade, "Surface Reflection: Physical and Geometrical Perspectives", IEEE Transactions on
 Pattern Analysis and Machine Intelligence 13 (1991), equations (36)-(50).
 """
@@ -29,20 +29,20 @@ KS = Parameter("ks", "1", 0.0, 10.0, 0.1, scale=True)
 SIGMA_DEG = Parameter("sigma_deg", "degrees", 0.5, 60.0, 20.0)
 LOBE_SIGMA_DEG = replace(SIGMA_DEG, name="lobe_sigma_deg", default=10.0)
 
-# Of an angle in radians: a slope theta_a to its density in 1/sr, or theta' to a reflectance.
+# Function of an angle in radians: density in 1/sr of a slope theta_a, or reflectance at theta'.
 OfAngle = Callable[[FloatArray], FloatArray]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 
 
 def torrance_sparrow_brdf(geometry: Geometry, ks: float, sigma_deg: float) -> FloatArray:
-    """Torrance and Sparrow's BRDF in 1/sr: ks G P(theta_a) / (4 cos_i cos_r cos_a).
+    """Torrance and Sparrow's BRDF: ks G P(theta_a) / (4 cos_i cos_r cos_a).
 
-    theta_a is the half-vector's polar angle, P the Gaussian (32) of width `sigma_deg`, and
-    G = min(1, 2 cos_a cos_r / cos', 2 cos_a cos_i / cos') the masking and shadowing of V-cavities,
-    theta' being the angle from the half-vector to the lamp (or the camera). `ks` is a Fresnel
-    factor that does not change with angle. Never negative; reciprocal. It grows without limit
-    only where lamp and camera both graze the surface.
+    Arguments and result as in `Model.brdf`. theta_a is the half-vector's polar angle, P the
+    Gaussian (32) of width `sigma_deg`, and G = min(1, 2 cos_a cos_r / cos', 2 cos_a cos_i / cos')
+    the masking and shadowing of V-cavities, theta' being the angle from the half-vector to the lamp
+    (or the camera). `ks` is a Fresnel factor that is the same at every angle. Never negative;
+    reciprocal. It grows without limit only where lamp and camera both graze the surface.
     """
     theta_a = half_vector(geometry)[0]
     P = slope_density(theta_a, math.radians(sigma_deg))
@@ -52,7 +52,7 @@ def torrance_sparrow_brdf(geometry: Geometry, ks: float, sigma_deg: float) -> Fl
 def torrance_sparrow_gradient(
     geometry: Geometry, ks: float, sigma_deg: float
 ) -> dict[str, FloatArray]:
-    """Derivatives of the BRDF by `ks` and by `sigma_deg`, in 1/sr and 1/sr per degree.
+    """Derivatives of `torrance_sparrow_brdf` by ks and by sigma. As in `Model.gradient`.
 
     d ln P / d sigma = (theta_a^2 - <theta_a^2>) / sigma^3: the mean square slope <theta_a^2> is
     the normalisation's part.
@@ -65,35 +65,35 @@ def torrance_sparrow_gradient(
 
 
 def torrance_sparrow_lobe_brdf(geometry: Geometry, ks: float, lobe_sigma_deg: float) -> FloatArray:
-    """`torrance_sparrow_brdf` whose width, in degrees, a sum does not share with other parts."""
+    """`torrance_sparrow_brdf` with a width that a sum does not share. As in `Model.brdf`."""
     return torrance_sparrow_brdf(geometry, ks, lobe_sigma_deg)
 
 
 def torrance_sparrow_lobe_gradient(
     geometry: Geometry, ks: float, lobe_sigma_deg: float
 ) -> dict[str, FloatArray]:
-    """Derivatives of `torrance_sparrow_lobe_brdf`, by name."""
-    slopes = torrance_sparrow_gradient(geometry, ks, lobe_sigma_deg)
-    return {"ks": slopes["ks"], "lobe_sigma_deg": slopes["sigma_deg"]}
+    """Derivatives of `torrance_sparrow_lobe_brdf`. As in `Model.gradient`."""
+    by = torrance_sparrow_gradient(geometry, ks, lobe_sigma_deg)
+    return {"ks": by["ks"], "lobe_sigma_deg": by["sigma_deg"]}
 
 
 def torrance_sparrow_validity(geometry: Geometry, **_: float) -> Validity:
-    """Everywhere but where lamp and camera both graze: P / cos is without limit there."""
+    """Valid unless lamp and camera both graze: P / cos diverges. Arguments as in `Model.brdf`."""
     return valid_except(geometry, (both_graze(geometry), GRAZING))
 
 
 def torrance_sparrow_full(
     geometry: Geometry, fresnel: OfAngle | FloatArray | float, density: OfAngle | float
 ) -> FloatArray:
-    """BRDF in 1/sr for any facets: 1991 (47) and (48) over L_i dω_i cos_i; 1995 (37).
+    """BRDF for any facets: 1991 (47) and (48) over L_i dω_i cos_i; 1995 (37). Library only.
 
-    F'(θ') G P(θ_a) / (4 cos_i cos_r cos_a). `fresnel` is the facets' energy reflectance F': a
-    number, an array that broadcasts with the geometry, or a function of θ' in radians, such as
-    `fresnel.polarised` with an index, real or complex, and the weight h of (42). `density` is
-    P(θ_a) in 1/sr of θ_a in radians, per facet AREA, with ∫ P dω = 1 over the hemisphere; a number
-    is the width in degrees of the Gaussian (32). The 1991 paper counts facets instead: its
-    a_f ρ_α(α) is P / cos_a here. θ' and θ_a are the half-vector's: the paper's (39), by way of
-    asin, is ambiguous and unstable.
+    F'(θ') G P(θ_a) / (4 cos_i cos_r cos_a), in 1/sr and of the geometry's shape. `fresnel` is the
+    facets' energy reflectance F': a number, an array that broadcasts with the geometry, or a
+    function of θ' in radians, such as `fresnel.polarised` with an index, real or complex, and the
+    weight h of (42). `density` is P(θ_a) in 1/sr of θ_a in radians, per facet AREA, with ∫ P dω = 1
+    over the hemisphere; a number is the width in degrees of the Gaussian (32). The 1991 paper
+    counts facets instead: its a_f ρ_α(α) is P / cos_a here. θ' and θ_a are the half-vector's: the
+    paper's (39), which uses asin, is ambiguous and unstable.
     """
     theta_a = half_vector(geometry)[0]
     F = fresnel(local_incidence(geometry)) if callable(fresnel) else fresnel
@@ -108,7 +108,7 @@ def gaussian(sigma_deg: float) -> OfAngle:
 
 
 def attenuation(geometry: Geometry) -> FloatArray:
-    """G of V-cavities, 0 to 1: 1991, equation (44)."""
+    """G of V-cavities, 0 to 1, of the geometry's shape: 1991, equation (44). Library only."""
     _, cos_a, cos_half = half_vector(geometry)
     least = np.minimum(np.cos(geometry.theta_i), np.cos(geometry.theta_r))
     G: FloatArray = np.minimum(1.0, 2 * cos_a * least / cos_half)
@@ -116,7 +116,7 @@ def attenuation(geometry: Geometry) -> FloatArray:
 
 
 def local_incidence(geometry: Geometry) -> FloatArray:
-    """θ' in radians, the incidence on the facets that mirror lamp into camera: 1991 (38)."""
+    """θ' in radians, of the geometry's shape: incidence on the mirroring facets, 1991 (38)."""
     _, _, cos_half = half_vector(geometry)
     theta: FloatArray = np.arctan2(np.sqrt(_half_difference2(geometry)), cos_half)
     return theta
@@ -124,7 +124,7 @@ def local_incidence(geometry: Geometry) -> FloatArray:
 
 @cached_per_geometry
 def _denominator(geometry: Geometry) -> FloatArray:
-    """4 cos_i cos_r cos_a / G in one step: a grazing direction then needs no 0/0."""
+    """4 cos_i cos_r cos_a / G in one step, without 0/0 at grazing."""
     _, cos_a, cos_half = half_vector(geometry)
     cos_i, cos_r = np.cos(geometry.theta_i), np.cos(geometry.theta_r)
     return np.maximum(4 * cos_i * cos_r * cos_a, 2 * cos_half * np.maximum(cos_i, cos_r))
@@ -145,8 +145,9 @@ def half_vector(geometry: Geometry) -> tuple[FloatArray, ...]:
 
 @cached_per_geometry
 def off_mirror2(geometry: Geometry) -> FloatArray:
-    """Square of the part along the surface of the unit vectors to lamp and camera, summed.
+    """Squared length of the tangential part of the sum of the unit vectors to lamp and camera.
 
+    Dimensionless, of the geometry's shape.
     sin²θ_i + sin²θ_r + 2 sinθ_i sinθ_r cos dphi, as a sum of squares: nothing cancels near the
     mirror direction.
     """
@@ -164,7 +165,10 @@ def _half_difference2(geometry: Geometry) -> FloatArray:
 
 
 def slope_density(theta_a: FloatArray, sigma: float) -> FloatArray:
-    """Gaussian slope density P(theta_a) in 1/sr, both angles in radians: 1995, equation (32)."""
+    """Gaussian slope density P(theta_a) in 1/sr: 1995, equation (32).
+
+    `theta_a` of any shape, and the standard deviation `sigma`, in radians.
+    """
     return gaussian_normalisation(sigma) * np.exp(-0.5 * np.square(theta_a / sigma))
 
 
@@ -172,7 +176,7 @@ def slope_density(theta_a: FloatArray, sigma: float) -> FloatArray:
 def gaussian_normalisation(sigma: float) -> float:
     """The c of equation (32) in 1/sr for sigma in radians: P integrates to 1 over the hemisphere.
 
-    Gauss-Legendre quadrature of 64 points up to 9 sigma (beyond, less than 3e-18 is left): exact
+    Gauss-Legendre quadrature of 64 points up to 9 sigma (less than 3e-18 lies beyond): exact
     to about 1e-14 for sigma from 0.5 to 70 degrees.
     """
     return 1 / (2 * math.pi * _slope_integral(sigma, 0))

@@ -1,5 +1,8 @@
 """The unified framework: diffuse lobe, specular lobe and specular spike.
 
+What to use when: a surface that shows all three components. `moving_sensor` and `moving_source`,
+the paper's own equations, are library only.
+
 Source: S. K. Nayar, K. Ikeuchi, T. Kanade, "Surface Reflection: Physical and Geometrical
 Perspectives", IEEE Transactions on Pattern Analysis and Machine Intelligence 13 (1991),
 equations (61) and (62). Its double delta of the spike is here a Gaussian of a stated width, as the
@@ -31,11 +34,12 @@ def unified_brdf(
     spike: float,
     spike_width_deg: float,
 ) -> FloatArray:
-    """The three components as a BRDF in 1/sr: 1991, equation (61) over cosθ_i, made reciprocal.
+    """The three components as a BRDF: 1991, equation (61) over cosθ_i, made reciprocal.
 
+    Arguments and result as in `Model.brdf`.
     diffuse/π + lobe exp(-θ_a²/2σ²)/(cosθ_i cosθ_r) + spike exp(-δ²/2w²)/(2πw² √(cosθ_i cosθ_r)),
     δ the angle from the mirror direction. `diffuse` is an albedo, `spike` the reflectance of the
-    mirror that is left, `lobe` the lobe's peak at normal incidence. Never negative. Without
+    remaining mirror, `lobe` the lobe's peak at normal incidence. Never negative. Without
     attenuation it grows as 1/cosθ, as printed (footnote 8).
     """
     cc = np.cos(geometry.theta_i) * np.cos(geometry.theta_r)
@@ -53,7 +57,7 @@ def unified_gradient(
     spike: float,
     spike_width_deg: float,
 ) -> dict[str, FloatArray]:
-    """Derivatives of `unified_brdf` by its parameters, in 1/sr per unit of each."""
+    """Derivatives of `unified_brdf` by its parameters. As in `Model.gradient`."""
     del diffuse  # the BRDF is linear in it
     sigma, w, degree = math.radians(sigma_deg), math.radians(spike_width_deg), math.radians(1.0)
     theta_a = half_vector(geometry)[0]
@@ -72,7 +76,7 @@ def unified_gradient(
 
 
 def unified_validity(geometry: Geometry, **_: float) -> Validity:
-    """Up to where lamp or camera grazes: 1/cosθ has no limit there."""
+    """Valid unless lamp or camera grazes: 1/cosθ diverges. Arguments as in `Model.brdf`."""
     reason = "lamp or camera grazes the surface: the printed 1/cosθ, without attenuation, diverges"
     return valid_except(geometry, (either_grazes(geometry), reason))
 
@@ -88,7 +92,7 @@ def moving_sensor(
     """Image irradiance under a fixed lamp: 1991, equation (61), in the units of the C.
 
     C_dl + C_sl / cosθ_r exp(-α²/2σ²) + C_ss δ, with δ in 1/sr. The lobe has its peak beyond the
-    mirror direction.
+    mirror direction. Of the geometry's shape.
     """
     with np.errstate(under="ignore"):
         lobe = C_sl / np.cos(geometry.theta_r) * lobe_shape(geometry, sigma_deg)
@@ -106,7 +110,7 @@ def moving_source(
     """Image irradiance in a fixed camera: 1991, equation (62), in the units of the K.
 
     K_dl cosθ_i + K_sl exp(-α²/2σ²) + K_ss δ, with δ in 1/sr. Lobe and spike are symmetric about
-    θ_i = θ_r.
+    θ_i = θ_r. Of the geometry's shape.
     """
     with np.errstate(under="ignore"):
         lobe = K_sl * lobe_shape(geometry, sigma_deg)
@@ -115,7 +119,7 @@ def moving_source(
 
 
 def lobe_shape(geometry: Geometry, sigma_deg: float) -> FloatArray:
-    """exp(-α²/2σ²), 0 to 1: 1991, (56). α is the half-vector's angle θ_a, not by (39)."""
+    """exp(-α²/2σ²), 0 to 1, of the geometry's shape: 1991, (56), α the half-vector's θ_a."""
     sigma = math.radians(SIGMA_DEG.check(sigma_deg))
     return np.exp(-0.5 * np.square(half_vector(geometry)[0] / sigma))
 
@@ -123,16 +127,17 @@ def lobe_shape(geometry: Geometry, sigma_deg: float) -> FloatArray:
 def spike_shape(geometry: Geometry, spike_width_deg: float) -> FloatArray:
     """exp(-δ²/2w²)/(2πw²) in 1/sr, for the δ(θ_i - θ_r)δ(φ_r) of (61) and (62).
 
-    Over the directions it integrates to 1 - w²/3 (w in radians: 1e-4 less at 1 degree).
+    Of the geometry's shape. Over the directions it integrates to 1 - w²/3 (w in radians: 1e-4 less
+    at 1 degree).
     """
     w = math.radians(SPIKE_WIDTH_DEG.check(spike_width_deg))
     return np.exp(-0.5 * np.square(mirror_angle(geometry) / w)) / (2 * math.pi * w**2)
 
 
 def mirror_angle(geometry: Geometry) -> FloatArray:
-    """δ in radians, from the mirror direction of the lamp to the camera: 0 to π.
+    """δ in radians, 0 to π: angle from the lamp's mirror direction to the camera.
 
-    By the chord between the two, exact however small the angle is.
+    Of the geometry's shape. Computed from the chord, so that small angles are exact.
     """
     up = np.cos(geometry.theta_i) - np.cos(geometry.theta_r)
     chord = np.sqrt(off_mirror2(geometry) + up * up)

@@ -19,11 +19,10 @@ from analysis.models.smooth.chandrasekhar import (
     log_h_gradient,
 )
 from analysis.models.smooth.fresnel import unpolarised, wolff_polynomial
-from analysis.models.smooth.wolff import (
+from analysis.models.smooth.wolff import internal_return, wolff_brdf
+from analysis.models.smooth.wolff_oren_nayar import (
     TRANSITION_DEG,
-    internal_return,
     roughness_share,
-    wolff_brdf,
     wolff_oren_nayar_brdf,
 )
 from instrument.geometry import FloatArray, Geometry
