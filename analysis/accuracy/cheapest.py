@@ -5,8 +5,7 @@ to learn which method of `analysis.accuracy.method` keeps a tolerance in that sc
 takes, for a rough surface on a core of 2 GHz, 5 to 12 ms up to 2000 geometries and 15 to 30 ms for
 20 000 where the bounds settle the matter, half as much again for ranges; 20 to 115 ms where
 doubtful geometries have to be integrated. The integral itself takes 0.1 ms a geometry, so the
-search is worth it where the answer saves more than a hundred or two of them; a sum such as
-`beckmann_spizzichino`'s is as cheap as the search.
+search is worth it where the answer saves more than a hundred or two of them.
 
 Algorithm: methods are tried by rising cost. Each has a bound on its error over the whole range in
 each geometry. A few of the worst geometries are checked first, a form against the table and then
@@ -25,15 +24,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.accuracy.beckmann_lobe import BECKMANN_LOBE
 from analysis.accuracy.method import Method, MethodFamily
-from analysis.accuracy.rough_surface import ROUGH_SURFACE
-from analysis.accuracy.smooth_dielectric import SMOOTH_DIELECTRIC
 from analysis.models.base import Ranges
 from analysis.models.lambert import DARKEST
 from instrument.geometry import BoolArray, FloatArray, Geometry, IntArray
-
-FAMILIES = {f.name: f for f in (ROUGH_SURFACE, SMOOTH_DIELECTRIC, BECKMANN_LOBE)}
 
 CHECKS = 256
 """Largest number of doubtful geometries that are checked against the reference."""
@@ -55,7 +49,6 @@ class Adequate:
     cost_of_best: of the most accurate method. brdf: the method's kernel.
     """
 
-    family: str
     method: str
     brdf: Callable[..., FloatArray]
     predicted: float
@@ -66,7 +59,7 @@ class Adequate:
 
 
 def cheapest(
-    family: str,
+    family: MethodFamily,
     geometry: Geometry,
     ranges: Ranges,
     tolerance: ArrayLike,
@@ -84,28 +77,27 @@ def cheapest(
 
     Raises `ValueError` for a tolerance that not even the most accurate method keeps, a range that
     falls or leaves its parameter's domain, or one that is missing; `KeyError` for an unknown
-    family or method.
+    method.
     """
-    known = _family(family)
-    _check_ranges(known, ranges)
-    scene = _Scene(known, _flat(geometry), ranges, _tolerances(known, geometry, tolerance), checks)
-    names = [m.name for m in known.methods] if among is None else list(among)
-    methods = [known[name] for name in dict.fromkeys((*names, known.reference.name))]
+    _check_ranges(family, ranges)
+    tolerances = _tolerances(family, geometry, tolerance)
+    scene = _Scene(family, _flat(geometry), ranges, tolerances, checks)
+    names = [m.name for m in family.methods] if among is None else list(among)
+    methods = [family[name] for name in dict.fromkeys((*names, family.reference.name))]
     costs = {m.name: m.cost(scene.geometry, ranges).of(scene.size, uses) for m in methods}
     # Of two that cost the same the more accurate one, which stands later.
-    for method in sorted(methods, key=lambda m: (costs[m.name], -known.methods.index(m))):
+    for method in sorted(methods, key=lambda m: (costs[m.name], -family.methods.index(m))):
         predicted, checked = scene.judge(method)
         if checked is not None:
             break
     return Adequate(
-        family=known.name,
         method=method.name,
         brdf=method.kernel,
         predicted=predicted,
         checked=checked or 0.0,
         pairs=scene.pairs,
         cost=costs[method.name],
-        cost_of_best=costs[known.reference.name],
+        cost_of_best=costs[family.reference.name],
     )
 
 
@@ -288,12 +280,6 @@ def _between(errors: FloatArray, stepped: Sequence[bool]) -> FloatArray:
             edges = [(1, 1) if k == axis else (0, 0) for k in range(errors.ndim)]
             most = most + np.pad(bend, edges, mode="edge")
     return most
-
-
-def _family(name: str) -> MethodFamily:
-    if name not in FAMILIES:
-        raise KeyError(f"unknown family of methods {name!r}; known: {', '.join(FAMILIES)}")
-    return FAMILIES[name]
 
 
 def _check_ranges(family: MethodFamily, ranges: Ranges) -> None:

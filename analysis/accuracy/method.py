@@ -1,7 +1,8 @@
 """Methods of computing one reflectance model, each with a bound on its error and its cost.
 
-What to use when: `analysis.accuracy.cheapest.cheapest` to find the cheapest adequate method;
-`FAMILIES` there for all of them.
+What to use when: `analysis.accuracy.cheapest.cheapest` to find the cheapest adequate method of a
+family. `rough_surface` has the family that fits and pictures use; those of the smooth dielectric
+and the lobe are in `acquisition.benchmark.maps`, as their approximations save too little.
 
 =========  ==============================================  ====================================
 family     methods                                         reference

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from analysis.accuracy.cheapest import cheapest
+from analysis.accuracy.rough_surface import ROUGH_SURFACE
 from analysis.models import MODELS
 from analysis.models.rough.form_error_table import LIMIT_DEG
 from instrument.geometry import Brdf, FloatArray, Geometry
@@ -20,9 +21,8 @@ TOLERANCE = 3e-5
 of the error allowed for picture and window together (1e-4)."""
 
 INTEGRATED = "oren_nayar_exact"
-"""The one model for which the search pays. For a picture's geometries the smooth dielectric's exact
-method costs no more than any other; and all values of `beckmann_spizzichino` cost about as much as
-the search for the number of terms (measured: 18 ms, and 11 ms for the search)."""
+"""The one model for which the search pays. For a picture's geometries the exact methods of the
+smooth dielectric and of `beckmann_spizzichino` cost about as much as a search (18 and 11 ms)."""
 
 NEAR_GRAZING = 2e-4
 """Relative tolerance beyond 85 degrees: the accuracy that the exact model itself states there."""
@@ -58,5 +58,5 @@ def _term(
     larger = np.maximum(geometry.theta_i_deg, geometry.theta_r_deg)
     allowed = np.where(larger > LIMIT_DEG, np.maximum(tolerance, NEAR_GRAZING), tolerance)
     ranges = {parameter: (value, value) for parameter, value in values.items()}
-    found = cheapest("rough", geometry, ranges, allowed, checks=_CHECKS, among=_METHODS)
+    found = cheapest(ROUGH_SURFACE, geometry, ranges, allowed, checks=_CHECKS, among=_METHODS)
     return found.brdf(geometry, **values)

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.accuracy.cheapest import FAMILIES, cheapest
+from analysis.accuracy.cheapest import cheapest
+from analysis.accuracy.rough_surface import ROUGH_SURFACE
 from analysis.choice.ladder import SAME_PREDICTION, approximation
 from analysis.data.acceptance import Acceptance
 from analysis.data.measurements import Measurements
@@ -96,9 +97,9 @@ def _leaves_integral(form: FirstFit, measurements: Measurements) -> bool:
         u = np.full(measurements.size, float(np.sqrt(np.mean(np.square(left)))))
     allowed = np.divide(SAME_PREDICTION * u, np.abs(rough), out=np.ones_like(u), where=rough != 0)
     # Data without noise may ask for more than even the integral keeps.
-    allowed = np.maximum(allowed, FAMILIES["rough"].accuracy(measurements.geometry))
+    allowed = np.maximum(allowed, ROUGH_SURFACE.accuracy(measurements.geometry))
     ranges = {name: (value, value) for name, value in at.items()}
-    found = cheapest("rough", measurements.geometry, ranges, allowed, among=("functional",))
+    found = cheapest(ROUGH_SURFACE, measurements.geometry, ranges, allowed, among=("functional",))
     return found.method != "functional"
 
 

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from acquisition.benchmark.maps.beckmann_lobe import BECKMANN_LOBE
+from acquisition.benchmark.maps.smooth_dielectric import SMOOTH_DIELECTRIC
 from analysis.accuracy.method import MethodFamily
+from analysis.accuracy.rough_surface import ROUGH_SURFACE
 from analysis.models.base import Ranges
 from analysis.models.rough.form_error_table import LIMIT_DEG
 from instrument.geometry import Geometry
 
 Random = np.random.Generator
+
+FAMILIES = {f.name: f for f in (ROUGH_SURFACE, SMOOTH_DIELECTRIC, BECKMANN_LOBE)}
 
 SPANS: dict[str, tuple[float, float]] = {  # where geometric, the logarithm is drawn evenly
     "scale": (1e-3, 10.0),

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.accuracy import beckmann_lobe, smooth_dielectric
-from analysis.accuracy.beckmann_lobe import lobe_sums
-from analysis.accuracy.smooth_dielectric import ORDERS
+from acquisition.benchmark.maps import beckmann_lobe, smooth_dielectric
+from acquisition.benchmark.maps.beckmann_lobe import lobe_sums
+from acquisition.benchmark.maps.smooth_dielectric import ORDERS
 from analysis.models.error_maps import ABSOLUTE, FILE, RELATIVE, Levels
 from analysis.models.lambert import DARKEST, lambert_brdf
 from analysis.models.rough import form_error_table

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from acquisition.benchmark.maps.beckmann_lobe import TERMS, lobe_sums
 from acquisition.benchmark.maps.map_style import (
     PERCENT,
     MapPicture,
@@ -24,10 +25,14 @@ from acquisition.benchmark.maps.map_style import (
     level_legend,
     say_why,
 )
+from acquisition.benchmark.maps.smooth_dielectric import (
+    EPSILON,
+    ORDERS,
+    order_bound,
+    polynomial_bound,
+)
 from acquisition.benchmark.maps.window_map import window_picture
-from analysis.accuracy.beckmann_lobe import TERMS, lobe_sums
 from analysis.accuracy.identifiability import LIMIT, condition_map
-from analysis.accuracy.smooth_dielectric import EPSILON, ORDERS, order_bound, polynomial_bound
 from analysis.models.rough.form_error import form_error
 from analysis.models.rough.form_error_table import LIMIT_DEG
 from analysis.models.specular.beckmann_spizzichino import poisson_sum

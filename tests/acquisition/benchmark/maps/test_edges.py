@@ -12,6 +12,7 @@ from acquisition.measure.window import window_at
 from analysis.accuracy.cheapest import cheapest
 from analysis.accuracy.identifiability import LIMIT, condition, condition_map, sweep
 from analysis.accuracy.render_brdf import NEAR_GRAZING, TOLERANCE, adequate_brdf
+from analysis.accuracy.rough_surface import ROUGH_SURFACE
 from analysis.choice.choice import choose
 from analysis.data.measurements import Measurements
 from analysis.fit.fit import fit
@@ -65,7 +66,7 @@ def test_where_a_form_fails_validity_says_so_and_another_method_is_taken(
     assert "off the integral" in validity.reason
     ranges = {parameter: (value, value) for parameter, value in values.items()}
     method = name.removeprefix("oren_nayar_").replace("oren_nayar", "functional")
-    assert cheapest("rough", there, ranges, VALID, among=[method]).method == "fine"
+    assert cheapest(ROUGH_SURFACE, there, ranges, VALID, among=[method]).method == "fine"
 
 
 def test_what_is_not_mapped_is_said() -> None:

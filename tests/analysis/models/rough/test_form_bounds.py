@@ -6,14 +6,14 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.accuracy.cheapest import FAMILIES
+from analysis.accuracy.rough_surface import ROUGH_SURFACE
 from tests.support.method_scenes import angles, drawn_ranges, within
 
 
 @settings(max_examples=8)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_tight_bound_of_a_form_holds_and_is_tighter(seed: int) -> None:
-    family, random = FAMILIES["rough"], np.random.default_rng(seed)
+    family, random = ROUGH_SURFACE, np.random.default_rng(seed)
     geometry, ranges = angles(random, 60), drawn_ranges(random, family)
     for method in family.methods:
         if method.tight_bound is None:
