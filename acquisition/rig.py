@@ -1,9 +1,14 @@
-"""The one place that chooses real, emulated or simulated devices, by the rig file."""
+"""Devices of a rig file: the only module of `acquisition` that chooses real or simulated ones.
+
+What to use when: `open_devices` for a scan; `OpenRig` where single devices are needed, as for
+setting a rig up.
+"""
 
 from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from acquisition.engine.axis import Axis
@@ -23,29 +28,30 @@ from sim.scene.operator import SimulatedOperator, SimulatedShutter
 from sim.scene.scene import Scene
 
 if TYPE_CHECKING:
+    from drivers.factory import Lines
     from sim.emulated.bench import EmulatedBench
 
-WORDS = {
+_AXIS_TEXT = {  # in the operator's prompts
     "theta_i": "the lamp's angle of incidence",
     "dphi": "the lamp's azimuth from the camera's plane",
     "theta_r": "the camera's view angle",
 }
 
 
-def prepare(loaded: Loaded) -> None:
-    """What has to be so before a run's folder is made.
+def check_ready(loaded: Loaded) -> None:
+    """Raise `InputError` if a real rig has no operator at a terminal; call it before a scan.
 
-    Raises `InputError` where a real rig has no terminal at which somebody serves it.
+    The program restarts here where the rig's camera is emulated.
     """
     if loaded.rig.real:
         from acquisition.terminal.operator import require_terminal
 
         require_terminal(str(loaded.protocol_path))
-    see_emulated_camera(loaded.rig)
+    restart_for_emulated_camera(loaded.rig)
 
 
-def see_emulated_camera(rig: Rig) -> None:
-    """Start the program again, once, where its camera is emulated: see `sim.emulated.bench`."""
+def restart_for_emulated_camera(rig: Rig) -> None:
+    """Restart the program, once, if the rig's camera is emulated: see `sim.emulated.bench`."""
     if rig.emulated:
         from sim.emulated.bench import restart_with_camera
 
@@ -53,51 +59,60 @@ def see_emulated_camera(rig: Rig) -> None:
 
 
 def open_devices(loaded: Loaded, faults: Faults | None = None) -> Devices:
-    """Open every device of the rig file, and close them all again if one cannot be opened.
+    """Open every device of the rig file; close them all again if one cannot be opened.
 
-    A scene that is simulated answers the operator's prompts; its devices have the `faults`, or
-    those of the environment: see `sim.faults.faults`.
+    `faults` of a simulated rig, or those in the environment: see `sim.faults.faults`.
     """
     with ExitStack() as opening:
-        bench = opening.enter_context(Bench(loaded, faults))
-        axes = {name: bench.axis(name) for name in AXES}
-        camera, step = bench.camera(), bench.begin_step
-        devices = Devices(axes, camera, bench.lamp, bench.operator, bench.clock, step)
+        scene = None if loaded.rig.real else _scene(loaded)
+        rig = opening.enter_context(OpenRig(loaded.rig, scene, faults))
+        axes = {name: rig.axis(name) for name in AXES}
+        camera = rig.camera()
+        devices = Devices(axes, camera, rig.lamp, rig.operator, rig.clock, rig.begin_step)
         return replace(devices, close=opening.pop_all().close)
 
 
-class Bench(Closing):
-    """What a rig file describes; each device is opened when it is asked for. Use it with `with`."""
+def _scene(loaded: Loaded) -> Scene:
+    if loaded.protocol.simulated_sample is None:
+        raise InputError(
+            f"{loaded.protocol_path}: simulated_sample: missing, but the rig {loaded.rig_path} is "
+            "simulated: describe the sample"
+        )
+    return Scene.of(loaded.rig, loaded.protocol)
 
-    def __init__(self, loaded: Loaded, faults: Faults | None = None) -> None:
-        from drivers.factory import Lines
 
-        self._faults = (faults or Faults.from_environment()) if loaded.rig.simulated else None
-        self._rig, self._closing = loaded.rig, ExitStack()
-        self._scene = None if self._rig.real else _scene(loaded)
-        self.clock: Clock = SimulatedClock() if self._rig.simulated else SystemClock()
+class OpenRig(Closing):
+    """Devices of a rig, each opened on request and closed at the end of a `with` block.
+
+    `scene` is what a simulated or emulated rig shows; without one, a white sample.
+    """
+
+    def __init__(self, rig: Rig, scene: Scene | None = None, faults: Faults | None = None) -> None:
+        self._rig, self._closing = rig, ExitStack()
+        self._faults = (faults or Faults.from_environment()) if rig.simulated else None
+        self._scene = None if rig.real else scene or Scene.of_white_sample(rig)
+        self.clock: Clock = SimulatedClock() if rig.simulated else SystemClock()
         self.operator = self._operator()
         self.lamp = self._lamp()
-        self._lines = self._closing.enter_context(Lines(self.clock))
-        self._emulated = self._emulate() if self._rig.emulated else None
 
     def close(self) -> None:
-        """Let go of all of it; safe twice."""
+        """Close all devices; may be called twice."""
         self._closing.close()
 
     def axis(self, name: str) -> Axis:
-        """One axis, open."""
+        """Open one axis."""
         stage = self._stage(name)
         self._closing.callback(stage.close)
         return Axis(name, stage, self._rig.axes[name], self.clock)
 
     def camera(self) -> Camera:
-        """The camera, open."""
-        if isinstance(self._rig.camera, V4l2CameraConfig):
+        """Open the camera."""
+        settings = self._rig.camera
+        if isinstance(settings, V4l2CameraConfig):
             from drivers.factory import open_camera
 
-            settings = self._rig.camera
-            device = self._emulated.plug_camera(settings) if self._emulated else settings.device
+            emulated = self._emulated
+            device = emulated.plug_camera(settings) if emulated else settings.device
             camera: Camera = open_camera(settings, device, self.clock)
         else:
             from sim.scene.camera import SimulatedCamera
@@ -108,12 +123,12 @@ class Bench(Closing):
         return camera
 
     def begin_step(self, step: int, planned_s: float) -> None:
-        """Tell a simulated scene which step comes next, and when; a real bench need not know."""
+        """Announce the next step of the plan and its time to a scene; a real rig ignores it."""
         if self._scene is not None:
             self._scene.begin_step(step, planned_s)
 
-    def stand_at(self, theta_r_deg: float) -> None:
-        """Have a simulated scene stand so that something is to be seen; nothing real moves."""
+    def pose_scene(self, theta_r_deg: float) -> None:
+        """Set the axes of a scene so that the camera sees the lit sample; moves nothing real."""
         if self._scene is not None:
             for name, angle_deg in (("theta_i", 30.0), ("dphi", 0.0), ("theta_r", theta_r_deg)):
                 self._scene.set_axis(name, angle_deg)
@@ -121,27 +136,43 @@ class Bench(Closing):
     def _stage(self, name: str) -> Stage:
         settings = self._rig.axes[name]
         if isinstance(settings, HandAxis):
-            return HandSetAxis(name, WORDS[name], self.operator, settings.tolerance_deg)
+            return HandSetAxis(name, _AXIS_TEXT[name], self.operator, settings.tolerance_deg)
         if isinstance(settings, SimulatedAxis):
             from sim.scene.stage import SimulatedStage
 
             scene = self._simulated()
             stage = SimulatedStage(name, settings, scene, self.clock)
             return self._faults.stage(name, stage, settings, scene) if self._faults else stage
-        return self._driven(name, settings)
+        return self._motor_stage(name, settings)
 
-    def _driven(self, name: str, settings: Wired) -> Stage:
+    def _motor_stage(self, name: str, settings: Wired) -> Stage:
         from drivers.factory import open_stage
 
         port = self._emulated.plug_axis(name, settings) if self._emulated else settings.port
         return open_stage(name, settings, port, self._lines)
+
+    @cached_property
+    def _lines(self) -> Lines:
+        from drivers.factory import Lines
+
+        return self._closing.enter_context(Lines(self.clock))
+
+    @cached_property
+    def _emulated(self) -> EmulatedBench | None:
+        if not self._rig.emulated:
+            return None
+        from sim.emulated.bench import EmulatedBench
+
+        emulated = EmulatedBench(self._simulated(), self.clock)
+        self._closing.callback(emulated.close)
+        return emulated
 
     def _operator(self) -> Operator:
         if self._scene is None:
             from acquisition.terminal.operator import TerminalOperator
 
             return TerminalOperator()
-        # In real time too nobody waits for an operator who is simulated.
+        # An emulated rig runs in real time, but its operator need not take any.
         clock = self.clock if self._rig.simulated else SimulatedClock()
         operator = SimulatedOperator(self._scene, clock)
         return self._faults.operator(operator) if self._faults else operator
@@ -152,24 +183,7 @@ class Bench(Closing):
         shutter = SimulatedShutter(self._scene, self.clock)
         return self._faults.lamp(shutter) if self._faults else shutter
 
-    def _emulate(self) -> EmulatedBench:
-        from sim.emulated.bench import EmulatedBench
-
-        emulated = EmulatedBench(self._simulated(), self.clock)
-        self._closing.callback(emulated.close)
-        return emulated
-
     def _simulated(self) -> Scene:
         if self._scene is None:
             raise InputError(f"{self._rig.name}: simulated and real devices do not mix")
         return self._scene
-
-
-def _scene(loaded: Loaded) -> Scene:
-    sample = loaded.protocol.simulated_sample
-    if sample is None:
-        raise InputError(
-            f"{loaded.protocol_path}: simulated_sample: missing, but the rig {loaded.rig_path} is "
-            "simulated: say what the sample is"
-        )
-    return Scene(loaded.rig, loaded.protocol, sample)

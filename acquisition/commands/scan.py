@@ -22,7 +22,7 @@ from acquisition.results.run_folder import (
     run_meta,
     write_run_inputs,
 )
-from acquisition.rig import prepare
+from acquisition.rig import check_ready
 from acquisition.terminal.operator import require_yes
 from instrument.config.load import Loaded, load_protocol
 from instrument.errors import OperatorStop
@@ -39,7 +39,7 @@ def run_protocol(
     """
     loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
     plan = make_plan(loaded)
-    prepare(loaded)
+    check_ready(loaded)
     folder = out if out is not None else default_folder(loaded)
     require_disk_space(plan, loaded, folder)
     with Record.create(folder, run_meta(loaded, plan)) as record, record.claimed():
@@ -62,7 +62,7 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
         if missing:
             # Raises, before anything moves, where no way leads to the first missing pose.
             moves_between(home_pose(loaded.rig), missing[0].pose, loaded.rig)
-            prepare(loaded)
+            check_ready(loaded)
             with record.claimed():
                 _confirm(yes, len(missing), record)
                 scan(loaded, plan, record, progress)

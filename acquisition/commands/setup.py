@@ -1,4 +1,4 @@
-"""The commands for setting a rig up: `gonio devices`, `home`, `move` and `grab`."""
+"""Commands for setting up a rig: `gonio devices`, `home`, `move` and `grab`."""
 
 from __future__ import annotations
 
@@ -11,62 +11,67 @@ import numpy as np
 from acquisition.measure.window import Window, window_at
 from acquisition.plan.moves import axis_moves
 from acquisition.results.model_check import check_model
-from acquisition.rig import Bench, see_emulated_camera
+from acquisition.rig import OpenRig, restart_for_emulated_camera
 from acquisition.terminal.console import out
 from acquisition.terminal.operator import require_yes
 from instrument.config.axes import AXES, HandAxis, MotorAxis
-from instrument.config.load import Loaded, load_protocol, load_rig
-from instrument.config.protocol import Protocol
+from instrument.config.load import load_protocol, load_rig
+from instrument.config.protocol import PatchConfig
 from instrument.config.rig import Rig
 from instrument.devices import Frame
 from instrument.errors import DeviceError, InputError
 from instrument.pinhole import Pinhole
 from instrument.text.atomic_file import write_whole
 
-WINDOW_MM = 20.0  # of the window that is drawn where no protocol says how large it is
+# Outline that is drawn where no protocol gives its size.
+DEFAULT_PATCH = PatchConfig(width_mm=20.0, height_mm=20.0)
 
 
 def home_axis(axis: str, rig_path: Path | None, yes: bool) -> None:
-    """Find the reference of one axis."""
-    loaded = _bare(rig_path)
-    _motor(axis, loaded.rig)
-    with Bench(loaded) as bench:
-        stage = bench.axis(axis)
-        _confirm(loaded.rig, yes, f"{stage.identity()}\n{axis} will look for its reference.")
+    """Home one axis. `yes`: the rig may move, without asking the operator."""
+    rig = _load_rig(rig_path)
+    _motor(axis, rig)
+    with OpenRig(rig) as open_rig:
+        stage = open_rig.axis(axis)
+        _confirm(rig, yes, f"{stage.identity()}\n{axis} will look for its reference.")
         try:
             stage.home()
         except BaseException:
             stage.stop()
             raise
-        out.print(f"{axis}: stands at {stage.position_deg():.4f} deg", highlight=False)
+        _print_position(axis, stage.position_deg())
 
 
 def move_axis(axis: str, angle_deg: float, rig_path: Path | None, yes: bool) -> None:
-    """Move one axis to an angle of the rig. A simulated one is homed first."""
-    loaded = _bare(rig_path)
-    settings = _motor(axis, loaded.rig)
+    """Move one axis to `angle_deg` of the rig. `yes`: the rig may move, without asking."""
+    rig = _load_rig(rig_path)
+    settings = _motor(axis, rig)
     if not settings.min_deg <= angle_deg <= settings.max_deg:
         raise InputError(
-            f"gonio move: {axis} {angle_deg:g} deg; allowed by {loaded.rig_path}: "
+            f"gonio move: {axis} {angle_deg:g} deg; allowed by {rig_path}: "
             f"{settings.min_deg:g} to {settings.max_deg:g} deg. Nothing has moved."
         )
-    with Bench(loaded) as bench:
-        stage = bench.axis(axis)
-        if not loaded.rig.real:
-            stage.home()  # what is simulated begins anew with every command
-        here = stage.position_deg()
-        question = f"{stage.identity()}\n{axis} will move from {here:.4f} to {angle_deg:g} deg."
-        if loaded.rig.keep_out:
-            question += " Where the other axes stand is not known: keep-out zones are NOT checked."
-        _confirm(loaded.rig, yes, question)
+    with OpenRig(rig) as open_rig:
+        stage = open_rig.axis(axis)
+        if not rig.real:
+            stage.home()  # a simulated stage starts unhomed with every command
+        here_deg = stage.position_deg()
+        question = f"{stage.identity()}\n{axis} will move from {here_deg:.4f} to {angle_deg:g} deg."
+        if rig.keep_out:
+            question += " The other axes are not read: keep-out zones are NOT checked."
+        _confirm(rig, yes, question)
         try:
-            for move in axis_moves(axis, here, angle_deg, loaded.rig):
+            for move in axis_moves(axis, here_deg, angle_deg, rig):
                 stage.start_move(move.angle_deg)
                 stage.finish_move()
         except BaseException:
             stage.stop()
             raise
-        out.print(f"{axis}: stands at {stage.position_deg():.4f} deg", highlight=False)
+        _print_position(axis, stage.position_deg())
+
+
+def _print_position(axis: str, angle_deg: float) -> None:
+    out.print(f"{axis}: stands at {angle_deg:.4f} deg", highlight=False)
 
 
 def grab_frame(
@@ -78,37 +83,41 @@ def grab_frame(
     exposure_s: float | None,
     as_json: bool,
 ) -> None:
-    """Take one frame, for aiming: the picture with the window drawn on it, and its statistics.
+    """Take one frame, write it to `path` (.png or .tiff) and print its statistics.
 
-    Nothing moves: `theta_r_deg` says where the camera stands.
+    Nothing moves: `theta_r_deg` is the camera's present angle, for the outline of the window.
     """
     if path.suffix.lower() not in (".png", ".tif", ".tiff"):
         raise InputError(f"{path}: --out must end in .png (8 bit, drawn on) or .tiff (raw counts)")
-    if protocol_path is None:
-        loaded = _bare(rig_path)
-    else:
-        loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
-    low, high = loaded.rig.camera.min_exposure_s, loaded.rig.camera.max_exposure_s
+    rig, patch = _rig_and_patch(rig_path, protocol_path)
+    low, high = rig.camera.min_exposure_s, rig.camera.max_exposure_s
     if exposure_s is not None and not low <= exposure_s <= high:
         raise InputError(f"--exposure-s: {exposure_s:g} s; the camera can do {low:g} to {high:g} s")
-    see_emulated_camera(loaded.rig)
-    with Bench(loaded) as bench:
-        bench.stand_at(theta_r_deg)
-        camera = bench.camera()
+    restart_for_emulated_camera(rig)
+    with OpenRig(rig) as open_rig:
+        open_rig.pose_scene(theta_r_deg)
+        camera = open_rig.camera()
         camera.set_exposure_s(low if exposure_s is None else exposure_s)
         frame, identity = camera.grab(1)[0], camera.identity()
-    patch = loaded.protocol.window
-    window = window_at(theta_r_deg, Pinhole.of(loaded.rig), patch.width_mm, patch.height_mm)
-    write_whole(path, _encoded(frame, window, loaded.rig, path.suffix))
-    _print_statistics(_statistics(frame, window, loaded.rig), identity, path, as_json)
+    window = window_at(theta_r_deg, Pinhole.of(rig), patch.width_mm, patch.height_mm)
+    write_whole(path, _encoded(frame, window, rig, path.suffix))
+    _print_statistics(_statistics(frame, window, rig), identity, path, as_json)
+
+
+def _rig_and_patch(rig_path: Path | None, protocol_path: Path | None) -> tuple[Rig, PatchConfig]:
+    if protocol_path is None:
+        return _load_rig(rig_path), DEFAULT_PATCH
+    loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
+    return loaded.rig, loaded.protocol.window
 
 
 def _statistics(frame: Frame, window: Window, rig: Rig) -> dict[str, float]:
-    """Counts of the whole frame and of the window, in DN."""
+    """Counts of the whole frame and of the window, in DN, by name."""
     inside = frame.image[window.crop][window.counted]
     if not inside.size:
         raise InputError(
-            "grab: the window lies outside the picture: see axis_row_px, axis_column_px"
+            "gonio grab: the window lies outside the picture: check axis_row_px and "
+            "axis_column_px of the rig file"
         )
     return {
         "exposure_s": frame.exposure_s,
@@ -124,18 +133,20 @@ def _statistics(frame: Frame, window: Window, rig: Rig) -> dict[str, float]:
     }
 
 
-def _print_statistics(found: dict[str, float], identity: str, path: Path, as_json: bool) -> None:
+def _print_statistics(
+    statistics: dict[str, float], identity: str, path: Path, as_json: bool
+) -> None:
     if as_json:
-        sys.stdout.write(json.dumps({"camera": identity, "file": str(path), **found}) + "\n")
+        sys.stdout.write(json.dumps({"camera": identity, "file": str(path), **statistics}) + "\n")
         return
     out.print(identity, highlight=False)
-    for name, value in found.items():
+    for name, value in statistics.items():
         out.print(f"  {name:18} {value:.6g}", highlight=False)
     out.print(f"picture: {path}", highlight=False, soft_wrap=True)
 
 
 def _encoded(frame: Frame, window: Window, rig: Rig, suffix: str) -> bytes:
-    """The raw counts as TIFF, or the picture in 8 bit with the window's outline."""
+    """Raw counts as TIFF, or an 8-bit PNG with the window's outline and the rotation axis."""
     import cv2
 
     if suffix.lower() != ".png":
@@ -150,7 +161,10 @@ def _encoded(frame: Frame, window: Window, rig: Rig, suffix: str) -> bytes:
 
 
 def list_devices(rig_path: Path | None, identify: bool) -> None:
-    """Serial ports and cameras of this computer; with a rig file, who answers for each device."""
+    """Print the computer's serial ports and cameras; with a rig, open and identify its devices.
+
+    `identify`: query every serial port for known controllers.
+    """
     from drivers.discovery import cameras, serial_ports
 
     ports = serial_ports(identify)
@@ -162,18 +176,18 @@ def list_devices(rig_path: Path | None, identify: bool) -> None:
     for camera in found:
         out.print(camera, highlight=False, soft_wrap=True)
     if rig_path is not None:
-        _print_rig(rig_path)
+        _identify_devices(rig_path)
 
 
-def _print_rig(rig_path: Path) -> None:
-    loaded = _bare(rig_path)
-    see_emulated_camera(loaded.rig)
-    out.print(f"rig {loaded.rig.name} ({rig_path})", highlight=False)
+def _identify_devices(rig_path: Path) -> None:
+    rig = load_rig(rig_path)
+    restart_for_emulated_camera(rig)
+    out.print(f"rig {rig.name} ({rig_path})", highlight=False)
     failed = 0
-    with Bench(loaded) as bench:
+    with OpenRig(rig) as open_rig:
         for name in (*AXES, "camera"):
             try:
-                device = bench.camera() if name == "camera" else bench.axis(name)
+                device = open_rig.camera() if name == "camera" else open_rig.axis(name)
                 text = device.identity()
             except DeviceError as error:
                 text, failed = f"FAILED: {error}", failed + 1
@@ -183,7 +197,7 @@ def _print_rig(rig_path: Path) -> None:
 
 
 def _motor(axis: str, rig: Rig) -> MotorAxis:
-    """The settings of an axis that has a motor. Raises `InputError` where it has none."""
+    """Settings of a motorised axis; raises `InputError` for any other."""
     if axis not in AXES:
         raise InputError(f"{axis!r} is no axis; allowed: {', '.join(AXES)}")
     settings = rig.axes[axis]
@@ -192,26 +206,17 @@ def _motor(axis: str, rig: Rig) -> MotorAxis:
     return settings
 
 
-def _bare(rig_path: Path | None) -> Loaded:
-    """A rig without a scan: where it is simulated, a white sample stands there."""
-    if rig_path is None:
+def _load_rig(path: Path | None) -> Rig:
+    if path is None:
         raise InputError("name the rig file: --rig FILE")
-    rig = load_rig(rig_path)
-    protocol = Protocol.model_validate(
-        {
-            "name": "setting up",
-            "rig": str(rig_path),
-            "sample": {"name": "white", "width_mm": 50.0, "height_mm": 50.0},
-            "sweeps": [{"theta_i_deg": [0.0], "dphi_deg": [0.0], "theta_r_deg": [0.0]}],
-            "window": {"width_mm": WINDOW_MM, "height_mm": WINDOW_MM},
-            "simulated_sample": {"model": "lambert", "parameters": {"albedo": 0.9}},
-        }
-    )
-    return Loaded(protocol, rig_path, "", rig, rig_path, "")
+    return load_rig(path)
 
 
-def _confirm(rig: Rig, yes: bool, what: str) -> None:
-    """Nothing real moves before somebody has said so."""
+def _confirm(rig: Rig, yes: bool, question: str) -> None:
+    """Ask before a real rig moves, unless `yes`."""
     if rig.real and not yes:
-        nobody = f"{what}\nnobody to ask whether the rig is clear: add --yes"
-        require_yes(f"{what} Is the rig clear?", nobody, "nothing has moved")
+        require_yes(
+            f"{question} Is the rig clear?",
+            f"{question}\nnobody to ask whether the rig is clear: add --yes",
+            "nothing has moved",
+        )

@@ -52,7 +52,7 @@ def electrons_per_s(scene: Scene) -> FloatImage:
 
 
 def _project(scene: Scene) -> _Projection:
-    pinhole, size = Pinhole.of(scene.rig), scene.protocol.sample
+    pinhole, size = Pinhole.of(scene.rig), scene.size
     homography = pinhole.homography(
         scene.true_deg["theta_r"], scene.rig.simulation.sample_height_mm
     )
@@ -101,7 +101,7 @@ def _radiance_at(scene: Scene, points_mm: FloatArray) -> FloatArray:
 
 
 def _acceptance(scene: Scene) -> Acceptance:
-    return Acceptance.of(scene.rig, scene.protocol.window)
+    return Acceptance.of(scene.rig, scene.patch)
 
 
 def _rings(scene: Scene) -> int:

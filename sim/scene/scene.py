@@ -16,7 +16,13 @@ import numpy as np
 
 from analysis.accuracy.render_brdf import adequate_brdf
 from analysis.models import MODELS
-from instrument.config.protocol import Protocol, SimulatedSample
+from instrument.config.protocol import (
+    PatchConfig,
+    Protocol,
+    Sample,
+    SimulatedSample,
+    WhiteTile,
+)
 from instrument.config.rig import Rig
 from instrument.devices import Surface
 from instrument.geometry import Brdf, FloatArray, IntArray
@@ -31,13 +37,16 @@ def stream_key(name: str) -> int:
 class Scene:
     """Mounted surface, lamp and axes at one moment of a scan.
 
+    sample: reflectance of the sample. size: its extent. patch: the part of it that is measured.
     true_deg: true angle of each axis in degrees; it differs from the commanded one by the axis
     error. rings: see `sim.scene.render`; cache of the averaging needed for each place of the lamp.
     """
 
     rig: Rig
-    protocol: Protocol
     sample: SimulatedSample
+    size: Sample
+    patch: PatchConfig
+    white_tile: WhiteTile | None
     surface: Surface = "sample"
     lit: bool = True
     step: int = 0
@@ -45,6 +54,30 @@ class Scene:
     true_deg: dict[str, float] = field(default_factory=dict)
     rings: dict[tuple[str, float, float], IntArray] = field(default_factory=dict)
     _texture: FloatArray | None = None
+
+    @classmethod
+    def of(cls, rig: Rig, protocol: Protocol) -> Scene:
+        """Return the scene of a protocol; raise `ValueError` if it has no `simulated_sample`."""
+        if protocol.simulated_sample is None:
+            raise ValueError("the protocol has no simulated_sample: describe the sample")
+        return cls(
+            rig,
+            protocol.simulated_sample,
+            protocol.sample,
+            protocol.window,
+            protocol.references.white_tile,
+        )
+
+    @classmethod
+    def of_white_sample(cls, rig: Rig) -> Scene:
+        """Return a scene for setting a rig up: a matt white sample, 50 mm by 50 mm."""
+        return cls(
+            rig,
+            SimulatedSample(model="lambert", parameters={"albedo": 0.9}),
+            Sample(name="white", width_mm=50.0, height_mm=50.0),
+            PatchConfig(width_mm=20.0, height_mm=20.0),
+            None,
+        )
 
     def begin_step(self, step: int, planned_s: float) -> None:
         """Select the noise of the plan's step `step` and the lamp's age `planned_s`.
@@ -83,7 +116,7 @@ class Scene:
 
     def tile_reflectance(self) -> float:
         """Return the white tile's true reflectance: the certified one plus a random error."""
-        tile = self.protocol.references.white_tile
+        tile = self.white_tile
         if tile is None:
             raise ValueError("white tile requested, but the protocol has none")
         error = tile.u_reflectance * self.random(stream_key("white tile")).standard_normal()
@@ -98,7 +131,7 @@ class Scene:
 
         The spacing of the grid points is in mm.
         """
-        size = self.protocol.sample
+        size = self.size
         spacing_mm = self.sample.mottling_size_mm / 3.0
         rows = int(np.ceil(size.height_mm / spacing_mm)) + 1
         columns = int(np.ceil(size.width_mm / spacing_mm)) + 1

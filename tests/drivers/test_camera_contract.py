@@ -32,8 +32,7 @@ def camera(
 ) -> Iterator[Camera]:
     if request.param == "simulated":
         loaded = load_protocol(CONFIGS / "protocols" / "demo.yaml")
-        assert loaded.protocol.simulated_sample is not None
-        scene = Scene(loaded.rig, loaded.protocol, loaded.protocol.simulated_sample)
+        scene = Scene.of(loaded.rig, loaded.protocol)
         for axis, angle_deg in (("theta_i", 30.0), ("dphi", 0.0), ("theta_r", 0.0)):
             scene.set_axis(axis, angle_deg)
         yield SimulatedCamera(scene, SimulatedClock())

@@ -36,8 +36,7 @@ def simulated() -> Iterator[Stage]:
     loaded = load_protocol(CONFIGS / "protocols" / "demo.yaml")
     axis = loaded.rig.axes.theta_r
     assert isinstance(axis, SimulatedAxis)
-    assert loaded.protocol.simulated_sample is not None
-    scene = Scene(loaded.rig, loaded.protocol, loaded.protocol.simulated_sample)
+    scene = Scene.of(loaded.rig, loaded.protocol)
     yield SimulatedStage("theta_r", axis, scene, SimulatedClock())
 
 

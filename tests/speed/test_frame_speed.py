@@ -36,9 +36,7 @@ def test_a_simulated_frame_costs_less_than_twice_the_normal_numbers_for_it() -> 
     loaded = load_protocol(
         CONFIGS / "protocols" / "demo.yaml", CONFIGS / "rigs" / "paper_1995.yaml"
     )
-    sample = loaded.protocol.simulated_sample
-    assert sample is not None
-    scene = Scene(loaded.rig, loaded.protocol, sample)
+    scene = Scene.of(loaded.rig, loaded.protocol)
     camera = SimulatedCamera(scene, SimulatedClock())
     for axis in ("theta_i", "dphi", "theta_r"):
         scene.set_axis(axis, 40.0)

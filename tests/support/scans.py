@@ -77,9 +77,7 @@ def exact_rig(rig: Rig) -> Rig:
 
 def simulated_scene(loaded: Loaded, theta_i: float = 45.0, theta_r: float = 0.0) -> Scene:
     """Scene of the protocol's simulated sample at these angles, with dphi = 0."""
-    sample = loaded.protocol.simulated_sample
-    assert sample is not None
-    scene = Scene(loaded.rig, loaded.protocol, sample)
+    scene = Scene.of(loaded.rig, loaded.protocol)
     for axis, angle in (("theta_i", theta_i), ("dphi", 0.0), ("theta_r", theta_r)):
         scene.set_axis(axis, angle)
     return scene

@@ -96,8 +96,7 @@ class Watch:
 
 def ruler(loaded: Loaded) -> Callable[[], None]:
     """Takes a picture from a new angle, on a bench of its own."""
-    assert loaded.protocol.simulated_sample is not None
-    scene = Scene(loaded.rig, loaded.protocol, loaded.protocol.simulated_sample)
+    scene = Scene.of(loaded.rig, loaded.protocol)
     camera, angles = SimulatedCamera(scene, SimulatedClock()), iter(range(10**9))
     for axis in ("theta_i", "dphi"):
         scene.set_axis(axis, 40.0)

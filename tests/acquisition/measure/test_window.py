@@ -77,9 +77,7 @@ def _true_radiance(rig: Rig, loaded: Loaded, theta_i: float, dphi: float, theta_
 
 def _measured(loaded: Loaded, theta_i: float, dphi: float, theta_r: float) -> float:
     """The window's mean of the picture before noise and rounding, as radiance."""
-    sample = loaded.protocol.simulated_sample
-    assert sample is not None
-    scene = Scene(loaded.rig, loaded.protocol, sample)
+    scene = Scene.of(loaded.rig, loaded.protocol)
     for axis, angle in (("theta_i", theta_i), ("dphi", dphi), ("theta_r", theta_r)):
         scene.set_axis(axis, angle)
     patch = loaded.protocol.window

@@ -61,14 +61,9 @@ class Plant:
 
 def plant_of(kind: str, patch: pytest.MonkeyPatch) -> Plant:
     if kind == "simulated":
-        axis, sample, clock = (
-            DEMO.rig.axes.theta_r,
-            DEMO.protocol.simulated_sample,
-            SimulatedClock(),
-        )
+        axis, clock = DEMO.rig.axes.theta_r, SimulatedClock()
         assert isinstance(axis, SimulatedAxis)
-        assert sample is not None
-        stage = SimulatedStage("theta_r", axis, Scene(DEMO.rig, DEMO.protocol, sample), clock)
+        stage = SimulatedStage("theta_r", axis, Scene.of(DEMO.rig, DEMO.protocol), clock)
         return Plant(stage, clock, stage.position_deg, lambda: 0)
     # Limits that a controller does not keep itself must be in the rig file.
     limits = LIMITS if KINDS[kind].keeps_limits else replace(LIMITS, max_deg=MECHANICS.max_deg)
