@@ -1,4 +1,5 @@
-"""The vocabulary of the instrument: angles, devices, errors, clock, configuration, record.
+"""Vocabulary of the instrument: angles, devices, errors, time, configuration and run record.
 
-Knows none of the other packages; every other package knows this one.
+It imports none of the other packages, and all of them import it. Open `geometry` first: it states
+the convention of angles that everything else follows.
 """

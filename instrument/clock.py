@@ -1,4 +1,4 @@
-"""Time, injected: a scan never reads the wall clock by itself, so tests never wait for it."""
+"""Clock as an interface, so that simulated scans and tests run without waiting."""
 
 from __future__ import annotations
 
@@ -8,33 +8,33 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """What the program knows of time."""
+    """Source of time that is passed to everything that measures or waits."""
 
     def now_s(self) -> float:
-        """Seconds that only ever grow, from an arbitrary start."""
+        """Return monotonic time in seconds from an arbitrary start."""
         ...
 
     def utc(self) -> datetime:
-        """The date and time, UTC."""
+        """Return the date and time in UTC."""
         ...
 
     def sleep(self, seconds: float) -> None:
-        """Let `seconds` pass."""
+        """Wait for `seconds`."""
         ...
 
 
 class SystemClock:
-    """The computer's own clocks."""
+    """Clocks of the computer."""
 
     def now_s(self) -> float:
-        """Seconds of the monotonic clock."""
+        """Return the monotonic clock in seconds."""
         return time.monotonic()
 
     def utc(self) -> datetime:
-        """The date and time, UTC."""
+        """Return the date and time in UTC."""
         return datetime.now(UTC)
 
     def sleep(self, seconds: float) -> None:
-        """Wait."""
+        """Wait for `seconds`; not at all if that is negative."""
         if seconds > 0:
             time.sleep(seconds)

@@ -1,4 +1,4 @@
-"""What has to be let go of: `close()`, or the end of a `with` block."""
+"""Base class of resources that are closed by `close()` or at the end of a `with` block."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Self
 
 
 class Closing(ABC):
-    """Something that is open until it is closed."""
+    """Resource with `close()`, usable as a context manager."""
 
     @abstractmethod
     def close(self) -> None:
-        """Let go of it; safe twice."""
+        """Release the resource; may be called twice."""
 
     def __enter__(self) -> Self:
         return self

@@ -1,8 +1,7 @@
-"""Device interfaces: what the engine needs of a stage, a camera, a lamp and an operator.
+"""Device interfaces: what the scan needs of a stage, a camera, a lamp and an operator.
 
-Real drivers and simulated devices fulfil these alike; nothing else in the program knows which
-one it talks to. Angles are the device's own degrees; `acquisition.engine.axis` maps them to the
-rig's.
+Real drivers and simulated devices implement the same interfaces, so the scan does not know which it
+uses. Angles are the device's own degrees; `acquisition.engine.axis` converts them to the rig's.
 """
 
 from __future__ import annotations
@@ -19,9 +18,9 @@ Surface = Literal["sample", "white tile"]
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One picture: `image[row, column]` in counts (DN), its exposure and time of read-out.
+    """One image: `image[row, column]` in counts (DN), its exposure and time of read-out.
 
-    `device_time_s`: the camera's own time stamp, in seconds of the monotonic clock; None without.
+    `device_time_s`: the camera's own time stamp in seconds of the monotonic clock, None if none.
     """
 
     image: Image
@@ -32,7 +31,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What the operator is asked to do, in words and in terms that a simulated scene can act on."""
+    """Request to the operator, in words and in terms on which a simulated scene can act."""
 
     action: Literal["set axis", "place", "cover lamp", "uncover lamp"]
     text: str
@@ -42,95 +41,92 @@ class Request:
 
 
 class Operator(Protocol):
-    """Somebody at the bench, or the simulated scene in their place."""
+    """Person at the rig, or the simulated scene in their place."""
 
     def ask(self, request: Request) -> str:
-        """Return the answer once the request is done; raise `OperatorStop` when it is refused."""
+        """Return the answer once the request is done; raise `OperatorStop` if it is refused."""
         ...
 
 
 class Stage(Protocol):
-    """One rotary axis, in the device's own degrees. Only absolute moves."""
+    """Rotary axis with absolute moves, in the device's own degrees."""
 
     def identity(self) -> str:
-        """Who answers: maker, model, serial number."""
+        """Return maker, model and serial number as the device gives them."""
         ...
 
     def home(self) -> None:
-        """Find the reference; no motion is allowed before."""
+        """Search for the reference; no other motion is allowed before."""
         ...
 
     def homed(self) -> bool:
-        """Whether it knows its reference, asked once it has come to rest.
-
-        An axis that is set by hand always does.
-        """
+        """Return True if the axis, at rest, knows its reference; always so if set by hand."""
         ...
 
     def settings(self) -> dict[str, str]:
-        """What it is set to, read back from it where it tells; units in the names."""
+        """Return settings by name, read back from the device if possible; units in the names."""
         ...
 
     def start_move(self, angle_deg: float) -> None:
-        """Begin to move to `angle_deg`; returns at once."""
+        """Start a move to `angle_deg` and return at once."""
         ...
 
     def wait(self) -> float:
-        """Wait until the move has ended and return the position in degrees."""
+        """Wait for the end of the move and return the position in degrees."""
         ...
 
     def position_deg(self) -> float:
-        """Where the stage is, also while it moves."""
+        """Return the position in degrees, also during a move."""
         ...
 
     def limits_deg(self) -> tuple[float, float]:
-        """The least and the largest angle that it will go to."""
+        """Return the smallest and the largest angle in degrees that the axis accepts."""
         ...
 
     def stop(self) -> None:
-        """End all motion now; safe at any time, twice, and from another thread."""
+        """Stop all motion now; may be called at any time, twice, and from another thread."""
         ...
 
     def close(self) -> None:
-        """Let go of the device; safe twice."""
+        """Release the device; may be called twice."""
         ...
 
 
 class Camera(Protocol):
-    """A camera that gives raw counts."""
+    """Camera that returns raw counts."""
 
     def identity(self) -> str:
-        """Who answers: maker, model, serial number."""
+        """Return maker, model and serial number as the device gives them."""
         ...
 
     def settings(self) -> dict[str, str]:
-        """What it is set to, read back from it where it tells; units in the names."""
+        """Return settings by name, read back from the device if possible; units in the names."""
         ...
 
     def set_exposure_s(self, exposure_s: float) -> float:
-        """Set the exposure and return the one read back, in seconds."""
+        """Set the exposure and return the value read back, in seconds."""
         ...
 
     def grab(self, count: int) -> list[Frame]:
-        """Take `count` frames whose exposure began after this call."""
+        """Return `count` frames whose exposure began after this call."""
         ...
 
     def close(self) -> None:
-        """Let go of the device; safe twice."""
+        """Release the device; may be called twice."""
         ...
 
 
 class Lamp(Protocol):
-    """The lamp, or the shutter or lid before it."""
+    """Lamp, with the shutter or lid in front of it."""
 
     def identity(self) -> str:
-        """Who answers, or who covers it."""
+        """Return what darkens the lamp: the device's identity, or the operator."""
         ...
 
     def darken(self) -> None:
-        """No light on the sample."""
+        """Block all light on the sample."""
         ...
 
     def light(self) -> None:
-        """Full light on the sample."""
+        """Let full light onto the sample."""
         ...

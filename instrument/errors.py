@@ -1,4 +1,4 @@
-"""What can go wrong, and the exit code that scripts see for it.
+"""Exceptions that the program expects, each with the exit code of the command `gonio`.
 
 Every message names the device or file, the value, its unit, what is allowed and what to do next.
 """
@@ -7,15 +7,15 @@ from __future__ import annotations
 
 
 class GonioError(Exception):
-    """Base of all errors that the program expects; `exit_code` is what `gonio` returns."""
+    """Base of all expected errors; `exit_code` is the exit code of `gonio`."""
 
     exit_code = 1
 
 
 class InputError(GonioError):
-    """A protocol, rig or data file, or a command's argument, is wrong: nothing has moved.
+    """Mistake in a protocol, rig or data file or in an argument; nothing has moved.
 
-    `problems` holds one line for each mistake, each `file:line:column: path: what`.
+    `problems`: one line for each mistake, `file:line:column: path: what is wrong`.
     """
 
     exit_code = 2
@@ -26,28 +26,28 @@ class InputError(GonioError):
 
 
 class DeviceError(GonioError):
-    """A device failed: the message says which, what happened and what to look at."""
+    """Failure of a device: the message names it, what happened and what to check."""
 
     exit_code = 3
 
 
 class CameraLost(DeviceError):
-    """The camera is away or gives no frames; its next call looks for it and opens it anew."""
+    """Camera is gone or sends no frames; the next call to it searches for it and reopens it."""
 
 
 class StorageError(GonioError):
-    """The disk does not take what has to be kept: the message says which file and why."""
+    """Failure to write a file to disk: the message names the file and the reason."""
 
     exit_code = 3
 
 
 class OperatorStop(GonioError):
-    """The operator stopped the scan (Ctrl-C, or a refused prompt)."""
+    """Scan stopped by the operator, by Ctrl-C or by refusing a prompt."""
 
     exit_code = 4
 
 
 class NotDetermined(GonioError):
-    """The data do not determine what was asked, or are too few for any fit."""
+    """Data that do not determine the requested parameters, or are too few for any fit."""
 
     exit_code = 5

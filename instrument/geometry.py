@@ -1,4 +1,4 @@
-r"""Angles of a reflection measurement: the one convention of this program.
+r"""Angles of a reflection measurement: the convention of the whole program.
 
 ::
 
@@ -33,16 +33,15 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-_RADIANS = np.pi / 180  # a product with it is np.radians to the last bit, in a fifth of the time
+_RADIANS = np.pi / 180  # the product is np.radians to the last bit, in a fifth of the time
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Geometry:
-    """Broadcast angles of one or many reflections, in degrees, with theta_r >= 0.
+    """Angles of one or many reflections, in degrees: arrays of one shape (...), theta_r >= 0.
 
-    Two are equal only if they are the same object, so that others can keep what belongs to one.
-
-    Attributes: `theta_i_deg`, `theta_r_deg` in 0-90, `dphi_deg` in 0-360; arrays of one shape.
+    `theta_i_deg` and `theta_r_deg` from 0 to 90, `dphi_deg` from 0 to 360. Equality is identity, so
+    that a geometry can be the key of a cache.
     """
 
     theta_i_deg: FloatArray
@@ -53,7 +52,7 @@ class Geometry:
     def from_degrees(
         cls, *, theta_i: ArrayLike, theta_r: ArrayLike, dphi: ArrayLike = 0.0
     ) -> Geometry:
-        """Geometry of broadcastable angles in degrees; a negative theta_r means dphi + 180.
+        """Return the geometry of broadcastable angles in degrees; theta_r < 0 means dphi + 180.
 
         Raises `ValueError` for theta_i outside 0-90, theta_r outside -90-90, or a value that is
         not finite.
@@ -69,7 +68,7 @@ class Geometry:
 
     @classmethod
     def from_directions(cls, to_lamp: FloatArray, to_camera: FloatArray) -> Geometry:
-        """Geometry of unit vectors, shapes (..., 3) that broadcast, z along the sample normal."""
+        """Return the geometry of broadcastable unit vectors (..., 3), z along the sample normal."""
         to_lamp, to_camera = np.broadcast_arrays(to_lamp, to_camera)
         s_xy = np.hypot(to_lamp[..., 0], to_lamp[..., 1])
         v_xy = np.hypot(to_camera[..., 0], to_camera[..., 1])
@@ -83,7 +82,7 @@ class Geometry:
         )
 
     def blocks(self, size: int) -> Iterator[tuple[slice, Geometry]]:
-        """The geometries one after the other, `size` at a time, each with its place among them."""
+        """Yield slices of the flattened angles, `size` long, and geometries (size,) in degrees."""
         flat = [a.reshape(-1) for a in (self.theta_i_deg, self.theta_r_deg, self.dphi_deg)]
         for start in range(0, flat[0].size, size):
             part = slice(start, start + size)
@@ -91,22 +90,22 @@ class Geometry:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of the three arrays."""
+        """Shape of the arrays of angles."""
         return self.theta_i_deg.shape
 
     @property
     def theta_i(self) -> FloatArray:
-        """Angle of incidence in radians, for numerical kernels."""
+        """Angle of incidence (...) in radians, for numerical kernels: scalar or array."""
         return self.theta_i_deg * _RADIANS
 
     @property
     def theta_r(self) -> FloatArray:
-        """View angle in radians, for numerical kernels."""
+        """View angle (...) in radians, for numerical kernels: scalar or array."""
         return self.theta_r_deg * _RADIANS
 
     @property
     def cos_dphi(self) -> FloatArray:
-        """Cosine of the azimuth difference: 1 towards the lamp, -1 on the mirror side."""
+        """Cosine of dphi, a ratio, scalar or array: 1 on the lamp's side, -1 on the mirror side."""
         return np.cos(self.dphi_deg * _RADIANS)
 
 
@@ -119,13 +118,13 @@ def _require(name: str, value: FloatArray, low: float, high: float) -> None:
 
 
 def camera_direction(theta_r_deg: ArrayLike) -> FloatArray:
-    """Unit vector to the camera for a signed view angle, shape (..., 3): in the x-z plane."""
+    """Return the unit vector (..., 3) to the camera, for signed view angles (...) in degrees."""
     theta_r = np.radians(np.asarray(theta_r_deg, dtype=np.float64))
     return np.stack([np.sin(theta_r), np.zeros_like(theta_r), np.cos(theta_r)], axis=-1)
 
 
 def lamp_direction(theta_i_deg: ArrayLike, dphi_deg: ArrayLike) -> FloatArray:
-    """Unit vector to the lamp, shape (..., 3): at azimuth -dphi from the camera's plane."""
+    """Return the unit vector (..., 3) to the lamp, for broadcastable angles in degrees."""
     theta_i, dphi = np.broadcast_arrays(
         np.radians(np.asarray(theta_i_deg, dtype=np.float64)),
         np.radians(np.asarray(dphi_deg, dtype=np.float64)),
@@ -143,16 +142,16 @@ def lamp_direction(theta_i_deg: ArrayLike, dphi_deg: ArrayLike) -> FloatArray:
 def camera_to_lamp_deg(
     theta_i_deg: ArrayLike, theta_r_deg: ArrayLike, dphi_deg: ArrayLike
 ) -> FloatArray:
-    """Angle between the camera's and the lamp's directions in degrees (theta_r signed)."""
+    """Return the angle between camera and lamp in degrees; angles broadcast, theta_r signed."""
     cosine = np.sum(lamp_direction(theta_i_deg, dphi_deg) * camera_direction(theta_r_deg), axis=-1)
     angle: FloatArray = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
     return angle
 
 
 def cone_half_angle_deg(solid_angle_sr: float) -> float:
-    """Half-angle of the circular cone of that solid angle: Omega = 2 pi (1 - cos a)."""
+    """Return the half-angle in degrees of a circular cone: Omega = 2 pi (1 - cos a)."""
     return float(np.degrees(np.arccos(1.0 - solid_angle_sr / (2.0 * np.pi))))
 
 
 Brdf = Callable[[Geometry], FloatArray]
-"""Function that gives a BRDF in 1/sr, of the shape of the geometry's angles."""
+"""Function that returns a BRDF in 1/sr, in the shape of the geometry's angles."""

@@ -1,4 +1,4 @@
-"""How long a rotary axis takes: constant acceleration, cruise, constant deceleration."""
+"""Trapezoidal velocity profile of a rotary axis: duration of a move and position during it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Trapezoid:
-    """A move over `distance_deg` (signed) at a top speed and an acceleration, from rest to rest."""
+    """Move over a signed distance from rest to rest, accelerating and decelerating evenly."""
 
     distance_deg: float
     speed_deg_per_s: float
@@ -16,27 +16,27 @@ class Trapezoid:
 
     @property
     def _ramp_s(self) -> float:
-        """Time of the acceleration; a short move never reaches the top speed."""
+        """Duration of the acceleration in s; a short move never reaches the top speed."""
         to_speed = self.speed_deg_per_s / self.acceleration_deg_per_s2
         return min(to_speed, math.sqrt(abs(self.distance_deg) / self.acceleration_deg_per_s2))
 
     @property
     def duration_s(self) -> float:
-        """Seconds from rest to rest; none over no way, or over one too short for a float's root."""
+        """Seconds from rest to rest; 0 for no distance, or one whose square root underflows."""
         top = self.acceleration_deg_per_s2 * self._ramp_s
         if top == 0:
             return 0.0
         return self._ramp_s + abs(self.distance_deg) / top
 
     def travelled_deg(self, time_s: float) -> float:
-        """Signed degrees covered `time_s` after the start."""
+        """Return the signed distance in degrees covered `time_s` after the start."""
         duration, ramp = self.duration_s, self._ramp_s
         time_s = min(max(time_s, 0.0), duration)
         if time_s <= ramp:
-            way = self.acceleration_deg_per_s2 * time_s**2 / 2
+            covered_deg = self.acceleration_deg_per_s2 * time_s**2 / 2
         elif time_s >= duration - ramp:
             left_s = duration - time_s
-            way = abs(self.distance_deg) - self.acceleration_deg_per_s2 * left_s**2 / 2
+            covered_deg = abs(self.distance_deg) - self.acceleration_deg_per_s2 * left_s**2 / 2
         else:
-            way = self.acceleration_deg_per_s2 * ramp * (time_s - ramp / 2)
-        return math.copysign(way, self.distance_deg)
+            covered_deg = self.acceleration_deg_per_s2 * ramp * (time_s - ramp / 2)
+        return math.copysign(covered_deg, self.distance_deg)

@@ -1,9 +1,9 @@
-"""The pinhole camera on the beam: points of the sample's plane to pixels and back.
+"""Pinhole model of the camera on the beam: projection of the sample's plane to pixels.
 
-Written once: the simulated camera renders with it and the measuring window is projected with it.
-Pixel coordinates are (column, row); the centre of pixel `image[row, column]` lies at the whole
-numbers, so the pixel covers column +- 1/2, row +- 1/2. At theta_r = 0 and no roll, columns grow
-with the sample's x and rows fall with its y.
+The simulated camera and the measuring window use the same model. Pixel coordinates are (column,
+row); the centre of pixel `image[row, column]` has integer coordinates, so the pixel extends from
+column - 1/2 to column + 1/2. At theta_r = 0 without roll, the column increases with the sample's x
+and the row decreases with its y.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from instrument.config.rig import Rig
 from instrument.geometry import FloatArray, camera_direction
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Pinhole:
-    """A camera at the end of the beam, aimed so that the rotation axis appears at a given pixel."""
+    """Camera at the end of the beam, aimed so that the rotation axis appears at a given pixel."""
 
     beam_length_mm: float
     field_width_mm: float
@@ -31,32 +31,33 @@ class Pinhole:
 
     @classmethod
     def of(cls, rig: Rig) -> Pinhole:
-        """The camera that a rig file describes."""
+        """Return the camera that a rig file describes."""
         camera = rig.camera
         return cls(
-            rig.beam_length_mm,
-            camera.field_width_mm,
-            camera.width_px,
-            camera.height_px,
-            camera.axis_column_px,
-            camera.axis_row_px,
-            camera.roll_deg,
+            beam_length_mm=rig.beam_length_mm,
+            field_width_mm=camera.field_width_mm,
+            width_px=camera.width_px,
+            height_px=camera.height_px,
+            axis_column_px=camera.axis_column_px,
+            axis_row_px=camera.axis_row_px,
+            roll_deg=camera.roll_deg,
         )
 
     @property
     def focal_px(self) -> float:
-        """Focal length in pixels: the picture's width shows `field_width_mm` at the axis."""
+        """Focal length in pixels: the image width covers `field_width_mm` at the axis."""
         return self.beam_length_mm * self.width_px / self.field_width_mm
 
     @property
     def _centre_px(self) -> FloatArray:
-        """The foot of the optical axis: the middle of the picture, (column, row)."""
+        """Principal point: the middle of the image, (column, row)."""
         return np.array([(self.width_px - 1) / 2, (self.height_px - 1) / 2])
 
     def homography(self, theta_r_deg: float, height_mm: float = 0.0) -> FloatArray:
-        """3 x 3 map of (x, y, 1) mm on the plane z = height_mm to (column, row, 1) times a depth.
+        """Return the 3 x 3 homography from the plane z = height_mm to the image.
 
-        `theta_r_deg` is signed. The camera's position is beam_length_mm * camera_direction.
+        It maps (x, y, 1) in mm to (column, row, 1) in pixels, times a depth. `theta_r_deg` is
+        signed. The camera's position is beam_length_mm * camera_direction.
         """
         position = self.beam_length_mm * camera_direction(theta_r_deg)
         plane = np.column_stack([[1.0, 0, 0], [0, 1.0, 0], np.array([0, 0, height_mm]) - position])
@@ -66,13 +67,14 @@ class Pinhole:
     def project(
         self, points_mm: ArrayLike, theta_r_deg: float, height_mm: float = 0.0
     ) -> FloatArray:
-        """Pixels (..., 2) as (column, row) of points (..., 2) mm on the plane z = height_mm."""
+        """Map points (..., 2) mm on the plane z = height_mm to (..., 2) pixels, column first."""
         return apply_homography(self.homography(theta_r_deg, height_mm), points_mm)
 
     def cos4(self, columns: ArrayLike, rows: ArrayLike) -> FloatArray:
-        """Fall-off of irradiance in the picture, cos^4 of the angle off the optical axis.
+        """Return the relative irradiance of pixels: cos^4 of the angle from the optical axis.
 
-        Nayar, Ikeuchi and Kanade 1991, equation (81).
+        Columns and rows in pixels, scalars or arrays that broadcast. Nayar, Ikeuchi and Kanade
+        1991, equation (81).
         """
         centre = self._centre_px
         offset2 = (np.asarray(columns, dtype=np.float64) - centre[0]) ** 2 + (
@@ -87,7 +89,7 @@ class Pinhole:
         return np.array([[focal, 0, column], [0, focal, row], [0, 0, 1.0]])
 
     def _orientation(self, theta_r_deg: float) -> FloatArray:
-        """Rotation from the sample's axes to the camera's (right, down, forward)."""
+        """Return the rotation from the sample's axes to the camera's (right, down, forward)."""
         theta_r, roll = np.radians([theta_r_deg, self.roll_deg])
         look_at_axis = np.array(
             [
@@ -103,7 +105,7 @@ class Pinhole:
         return orientation
 
     def _aim(self) -> FloatArray:
-        """Smallest rotation that brings the rotation axis from the optical axis to its pixel."""
+        """Return the smallest rotation that takes the axis from the image centre to its pixel."""
         offset = np.array([self.axis_column_px, self.axis_row_px]) - self._centre_px
         ray = np.append(offset / self.focal_px, 1.0)
         x, y, z = ray / np.linalg.norm(ray)
@@ -117,7 +119,7 @@ class Pinhole:
 
 
 def apply_homography(matrix: FloatArray, points: ArrayLike) -> FloatArray:
-    """Map points (..., 2) by a 3 x 3 homography."""
+    """Map points (..., 2) by a 3 x 3 homography; units as in `Pinhole.homography`."""
     points = np.asarray(points, dtype=np.float64)
     mapped = points @ matrix[:, :2].T + matrix[:, 2]
     result: FloatArray = mapped[..., :2] / mapped[..., 2:]
@@ -125,7 +127,10 @@ def apply_homography(matrix: FloatArray, points: ArrayLike) -> FloatArray:
 
 
 def area_per_pixel_mm2(homography: FloatArray, columns: ArrayLike, rows: ArrayLike) -> FloatArray:
-    """Area of the plane that one pixel sees, mm^2: the Jacobian of the inverse homography."""
+    """Return the area of the plane that a pixel sees, in mm^2, from the inverse homography.
+
+    Columns and rows in pixels, scalars or arrays that broadcast.
+    """
     back = np.linalg.inv(homography)
     depth = back[2, 0] * np.asarray(columns) + back[2, 1] * np.asarray(rows) + back[2, 2]
     area: FloatArray = np.abs(np.linalg.det(back) / depth**3)
@@ -133,7 +138,7 @@ def area_per_pixel_mm2(homography: FloatArray, columns: ArrayLike, rows: ArrayLi
 
 
 def rectangle_mm(width_mm: float, height_mm: float) -> FloatArray:
-    """The four corners (4, 2) of a rectangle about the origin of the sample's plane."""
+    """Return the corners (4, 2) in mm of a rectangle centred on the origin of the plane."""
     corners = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
     rectangle: FloatArray = corners * np.array([width_mm, height_mm])
     return rectangle

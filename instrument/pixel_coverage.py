@@ -1,8 +1,7 @@
-"""How much of every pixel a polygon covers, exactly.
+"""Exact fraction of each pixel that a polygon covers, by Green's theorem on the pixel grid.
 
-Each edge is cut where it crosses a pixel's border; every piece adds its signed height to the
-pixel it lies in and to all pixels right of it. One running sum along the rows then gives the
-area: Green's theorem on the pixel grid.
+Each edge is cut at the pixel borders that it crosses; every piece adds its signed height to its
+pixel and to all pixels right of it. One cumulative sum along the rows then gives the area.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from instrument.geometry import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """Fractions 0-1 of pixels covered, over the crop that starts at (row, column)."""
+    """Covered fraction (rows, columns) of each pixel, 0 to 1, in a crop from (row, column)."""
 
     row: int
     column: int
@@ -25,16 +24,16 @@ class Coverage:
 
     @property
     def crop(self) -> tuple[slice, slice]:
-        """Where `fraction` lies in the picture."""
+        """Slices of the image, rows and columns, that `fraction` belongs to."""
         rows, columns = self.fraction.shape
         return slice(self.row, self.row + rows), slice(self.column, self.column + columns)
 
 
 def polygon_coverage(polygon_px: FloatArray, width_px: int, height_px: int) -> Coverage:
-    """Coverage of a simple polygon, corners (N, 2) as (column, row), cut at the picture's edges.
+    """Return the coverage of a simple polygon, clipped at the edges of the image.
 
-    `inside_frame` says whether the whole polygon lies in the picture. A polygon wholly outside
-    gives an empty crop.
+    `polygon_px`: corners (N, 2) in pixels as (column, row). `inside_frame` of the result is True if
+    the whole polygon lies in the image. A polygon outside the image gives an empty crop.
     """
     corners = np.asarray(polygon_px, dtype=np.float64) + 0.5  # pixel n now covers n to n + 1
     size = np.array([width_px, height_px])
@@ -51,14 +50,14 @@ def polygon_coverage(polygon_px: FloatArray, width_px: int, height_px: int) -> C
 
 
 def _add_edge(sums: FloatArray, start: FloatArray, end: FloatArray) -> None:
-    """Add one edge's signed heights; `sums` has one spare column at the right."""
+    """Add the signed heights of one edge; `sums` has one spare column on the right."""
     rows, columns = sums.shape[0], sums.shape[1] - 1
     cuts = _cuts(start, end, columns, rows)
     points = start + np.outer(cuts, end - start)
     middle = (points[:-1] + points[1:]) / 2
     height = np.diff(points[:, 1])
     keep = (middle[:, 1] > 0) & (middle[:, 1] < rows)
-    x = np.clip(middle[keep, 0], 0.0, columns)  # left of the crop counts in full, right not at all
+    x = np.clip(middle[keep, 0], 0.0, columns)  # left of the crop: in full; right: nothing
     row = middle[keep, 1].astype(int)
     column = np.minimum(x.astype(int), columns - 1) if columns else x.astype(int)
     part = x - column
@@ -68,7 +67,7 @@ def _add_edge(sums: FloatArray, start: FloatArray, end: FloatArray) -> None:
 
 
 def _cuts(start: FloatArray, end: FloatArray, columns: int, rows: int) -> FloatArray:
-    """Parameters 0-1 along an edge where it enters another pixel, ends included."""
+    """Return the parameters 0 to 1 at which an edge enters another pixel, both ends included."""
     cuts = [np.array([0.0, 1.0])]
     for axis, size in ((0, columns), (1, rows)):
         if start[axis] != end[axis]:

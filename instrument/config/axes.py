@@ -1,7 +1,8 @@
-"""The axes of a rig file: what drives each, within which limits, how fast, how well.
+"""Axes of a rig file: driver, limits, speed and uncertainty of each.
 
-The driver of an axis matters only here, in `acquisition.rig`, and in the two modules that handle
-every member of `Wired`: `drivers.factory` and `sim.emulated.bench`.
+One class for each kind of driver; a kind that is not listed here is refused. The driver of an axis
+matters only here, in `acquisition.rig`, and in the two modules that handle every member of `Wired`:
+`drivers.factory` and `sim.emulated.bench`.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from instrument.config.section import Finite, NotNegative, Positive, Section
 AXES = ("theta_i", "dphi", "theta_r")
 AxisName = Literal["theta_i", "dphi", "theta_r"]
 EMULATED = "emulated"
-"""In place of a port or a device: the driver talks to an emulated one, over the simulated scene."""
+"""Value of `port` or `device` that connects the driver to an emulated device."""
 
 LEAST_TOLERANCE_DEG = 0.01
 
-# pyserial has more kinds of address, of which one writes to any file that it names (spy://).
+# pyserial knows more kinds of address; one of them, spy://, writes to any file.
 Port = Annotated[
     str,
     Field(
@@ -40,40 +41,40 @@ class _Axis(Section):
     u_deg: NotNegative
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """The limits stand in order."""
+        """Require min_deg < max_deg."""
         if self.min_deg >= self.max_deg:
             yield "min_deg", f"{self.min_deg:g}; allowed: less than max_deg {self.max_deg:g}"
 
     @property
     def tolerance_deg(self) -> float:
-        """How far from its target a move may end."""
+        """Largest allowed distance in degrees of a finished move from its target."""
         return max(3 * self.u_deg, LEAST_TOLERANCE_DEG)
 
     def to_device_deg(self, angle_deg: float) -> float:
-        """An angle of the rig in the device's own degrees."""
+        """Convert an angle of the rig to the device's own degrees."""
         return self.zero_deg + self.sign * angle_deg
 
     def from_device_deg(self, angle_deg: float) -> float:
-        """The device's own degrees as an angle of the rig."""
+        """Convert the device's own degrees to an angle of the rig."""
         return (angle_deg - self.zero_deg) * self.sign
 
     def device_limits_deg(self) -> tuple[float, float]:
-        """The limits in the device's own degrees, the lower first."""
+        """Return the limits in the device's own degrees, the lower one first."""
         low, high = sorted(map(self.to_device_deg, (self.min_deg, self.max_deg)))
         return low, high
 
 
 class HandAxis(_Axis):
-    """An axis that the operator sets by hand; `set_s` is how long that takes."""
+    """Axis that the operator sets by hand, which takes `set_s` seconds."""
 
     driver: Literal["hand"]
     set_s: NotNegative = 60.0
 
 
 class _MotorAxis(_Axis):
-    """A motor; its device reads zero_deg when the axis stands at 0.
+    """Motor; its device reads `zero_deg` when the axis is at 0.
 
-    `home_deg` is where the axis stands after homing, which takes up to `homing_s`.
+    After homing, which takes up to `homing_s`, the axis is at `home_deg`.
     """
 
     speed_deg_per_s: Positive
@@ -85,13 +86,13 @@ class _MotorAxis(_Axis):
 
 
 class SimulatedAxis(_MotorAxis):
-    """A motor that is simulated as a whole, in simulated time."""
+    """Simulated motor in simulated time, without a driver."""
 
     driver: Literal["simulated"]
 
 
 class NewportAxis(_MotorAxis):
-    """A motor behind Newport's SMC100 or CONEX-CC; `port` is best a /dev/serial/by-id path."""
+    """Motor on a Newport SMC100 or CONEX-CC; prefer a /dev/serial/by-id path as `port`."""
 
     driver: Literal["newport"]
     port: Port
@@ -100,12 +101,12 @@ class NewportAxis(_MotorAxis):
 
     @property
     def place(self) -> str:
-        """Which of the devices on the port."""
+        """Address of the device on the port, in words."""
         return f"address {self.address}"
 
 
 class ZaberAxis(_MotorAxis):
-    """A Zaber stage; `microsteps_per_deg` is the stage's own (X-RSW60: 4266.667)."""
+    """Zaber stage; `microsteps_per_deg` is a constant of the stage (X-RSW60: 4266.667)."""
 
     driver: Literal["zaber"]
     port: Port
@@ -115,15 +116,15 @@ class ZaberAxis(_MotorAxis):
 
     @property
     def place(self) -> str:
-        """Which of the devices on the port, and which axis of it."""
+        """Address of the device on the port, and its axis, in words."""
         return f"device {self.device} axis {self.axis}"
 
 
 class OrientalAxis(_MotorAxis):
-    """A motor behind Oriental Motor's AZ drive, Modbus.
+    """Motor on an Oriental Motor AZ drive with Modbus.
 
     `port`: a /dev/serial/by-id path for RTU, or tcp://host:port of a gateway. `steps_per_deg`
-    follows from the gear and the drive's electronic gear.
+    depends on the gear and on the drive's electronic gear.
     """
 
     driver: Literal["oriental"]
@@ -135,7 +136,7 @@ class OrientalAxis(_MotorAxis):
 
     @property
     def place(self) -> str:
-        """Which of the devices on the port."""
+        """Address of the device on the port, in words."""
         return f"unit {self.unit}"
 
 
@@ -148,7 +149,7 @@ Axis = Annotated[
 
 
 class Axes(Section):
-    """The three axes: where the lamp stands (theta_i, dphi) and where the camera (theta_r)."""
+    """The three axes: theta_i and dphi position the lamp, theta_r the camera."""
 
     theta_i: Axis
     dphi: Axis

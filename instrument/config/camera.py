@@ -1,4 +1,4 @@
-"""The camera of a rig file."""
+"""Camera of a rig file: image size, sensor, exposure, and the settings of each driver."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _FORMAT_BITS = {"GREY": 8, "YUYV": 8, "Y10": 10, "Y16": 16}
 
 
 class CameraConfig(Section):
-    """The camera on the beam: picture, electrons, exposure."""
+    """Camera on the beam: image, field of view, sensor and exposure."""
 
     width_px: Annotated[int, Field(ge=16, le=16384)]
     height_px: Annotated[int, Field(ge=16, le=16384)]
@@ -32,7 +32,7 @@ class CameraConfig(Section):
     frame_overhead_s: NotNegative
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """Exposures in order, the axis inside the picture, room above the black level."""
+        """Check the order of exposures, the axis inside the image, and the black level."""
         if self.min_exposure_s > self.max_exposure_s:
             yield (
                 "min_exposure_s",
@@ -41,7 +41,7 @@ class CameraConfig(Section):
         for key, size in (("axis_row_px", self.height_px), ("axis_column_px", self.width_px)):
             value = getattr(self, key)
             if not 0 <= value <= size - 1:
-                yield key, f"{value:g} lies outside the picture; allowed: 0 to {size - 1}"
+                yield key, f"{value:g} is outside the image; allowed: 0 to {size - 1}"
         if self.black_level_dn >= self.max_dn / 2:
             yield (
                 "black_level_dn",
@@ -52,37 +52,37 @@ class CameraConfig(Section):
             yield (
                 "black_level_dn",
                 f"{self.black_level_dn:g}; allowed: at least {least:.3g}, 4 times the read noise "
-                "in counts, or darks are cut off at 0",
+                "in counts, or darks are clipped at 0",
             )
 
     @property
     def max_dn(self) -> int:
-        """The largest count that a pixel can give."""
+        """Largest count of a pixel, in DN."""
         return int(2**self.bit_depth - 1)
 
     @property
     def electrons_per_dn(self) -> float:
-        """Conversion gain: the full well fills the counts above the black level."""
+        """Conversion gain: the full well corresponds to the counts above the black level."""
         return self.full_well_electrons / (self.max_dn - self.black_level_dn)
 
     @property
     def exposure_step_s(self) -> float:
-        """Exposures are whole multiples of it; 0 where any exposure can be set."""
+        """Step of which exposures are whole multiples; 0 if any exposure can be set."""
         return 0.0
 
 
 class SimulatedCameraConfig(CameraConfig):
-    """A camera that is simulated as a whole, in simulated time."""
+    """Simulated camera in simulated time, without a driver."""
 
     driver: Literal["simulated"]
 
 
 class V4l2CameraConfig(CameraConfig):
-    """A Video4Linux camera; `device` is best a /dev/v4l/by-id path.
+    """Video4Linux camera; prefer a /dev/v4l/by-id path as `device`.
 
-    `gain` in the camera's own unit; where it is left out the camera must have none or keep its own.
+    `gain`: in the camera's own unit; if omitted, the camera keeps its gain or has none.
     `exposure_delay_frames`: frames after a change of exposure that may still have the old one.
-    `frames_per_s`: asked of the camera; left out, what it makes of 30 a second.
+    `frames_per_s`: requested from the camera; if omitted, 30 per second or what it sets instead.
     """
 
     driver: Literal["v4l2"]
@@ -94,11 +94,11 @@ class V4l2CameraConfig(CameraConfig):
 
     @property
     def exposure_step_s(self) -> float:
-        """V4L2's unit of exposure: 100 microseconds."""
+        """Unit of V4L2 exposures: 100 microseconds."""
         return V4L2_EXPOSURE_STEP_S
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """Whole steps of exposure; a format that carries the bits."""
+        """Require whole steps of exposure, and a pixel format with enough bits."""
         yield from super().mistakes()
         for key in ("min_exposure_s", "max_exposure_s"):
             steps = getattr(self, key) / V4L2_EXPOSURE_STEP_S

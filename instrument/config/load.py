@@ -1,7 +1,7 @@
-"""Reads rig and protocol files, and reports every mistake in them at once, with its place.
+"""Loading of rig and protocol files, with every mistake reported at once and with its position.
 
-Each mistake is one line, `file:line:column: path: what stands there; allowed: what (what to do)`.
-Parts that are sound by themselves are checked against each other even while others are broken.
+Each mistake is one line: `file:line:column: path: value; allowed: what (advice)`. Values that are
+valid by themselves are checked against each other even if others are not.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ from instrument.config.yaml_positions import (
 from instrument.errors import InputError
 from instrument.text.quoting import printable, shown
 
-MAX_REPORTED = 200  # mistakes a file; more would only scroll the first ones away
+MAX_REPORTED = 200  # mistakes per file; more would scroll the first ones off the screen
 
 AnySection = TypeVar("AnySection", bound=Section)
 
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
-    """A protocol and its rig, both sound and fitting each other, with their texts as read."""
+    """Valid protocol and rig that fit each other, with the texts of their files."""
 
     protocol: Protocol
     protocol_path: Path
@@ -69,11 +69,11 @@ def load_rig(path: Path) -> Rig:
 def load_protocol(
     path: Path, rig_path: Path | None = None, *, check_model: ModelCheck | None = None
 ) -> Loaded:
-    """Read a protocol and its rig; `rig_path` stands in for the rig that the protocol names.
+    """Read a protocol and its rig; `rig_path` replaces the rig that the protocol names.
 
     `check_model(name, parameters)` returns what is wrong with a model of the protocol, or None;
-    parameters are None where the protocol only names the model.
-    Raises `InputError` with every mistake in either file and between them.
+    parameters are None if the protocol only names the model. Raises `InputError` with every mistake
+    in either file and between them.
     """
     file = _File(path, read_yaml(yaml_bytes(path)))
     protocol = file.check(Protocol)
@@ -91,7 +91,7 @@ def load_protocol(
 
 
 def _rig_file(protocol: _File, rig_path: Path | None) -> _File | None:
-    """The rig's file; None, with its mistake noted, if the one that the protocol names is not."""
+    """Return the rig's file, or None, with a mistake added, if the named one cannot be read."""
     if rig_path is not None:
         try:
             return _File(rig_path, read_yaml(yaml_bytes(rig_path)))
@@ -103,7 +103,7 @@ def _rig_file(protocol: _File, rig_path: Path | None) -> _File | None:
     path = protocol.path.parent / named
     plain = Path(os.path.normpath(path))
     try:
-        # ".." behind a linked folder is not what it looks like.
+        # After a linked folder, ".." is not the folder that it seems to be.
         path = plain if plain.exists() or not path.exists() else path
         return _File(path, read_yaml(yaml_bytes(path)))
     except InputError as error:
@@ -114,7 +114,7 @@ def _rig_file(protocol: _File, rig_path: Path | None) -> _File | None:
 
 
 def _report(*files: _File) -> list[str]:
-    """The mistakes of all files, by file and place, each once."""
+    """Return the mistakes of all files, each once, ordered by file and position."""
     lines = []
     for file in sorted(files, key=lambda f: f.name):
         found = sorted(set(file.found), key=lambda item: (item[0], item[1]))
@@ -128,7 +128,7 @@ def _report(*files: _File) -> list[str]:
 
 @dataclass(slots=True)
 class _File:
-    """A configuration file while it is checked, and the mistakes found in it so far."""
+    """Configuration file under check, with the mistakes found so far."""
 
     path: Path
     marked: MarkedYaml
@@ -143,12 +143,12 @@ class _File:
         return printable(str(self.path))
 
     def add(self, path: KeyPath, text: str, mark: Mark | None = None) -> None:
-        """Note a mistake; without a mark it is placed at the value, or the block that lacks it."""
+        """Add a mistake; by default at the value, or at the block that lacks it."""
         where = f"{dotted(path)}: " if path else ""
         self.found.append((mark or self.marked.mark(path), where + text))
 
     def check(self, model: type[AnySection]) -> AnySection | None:
-        """The file as a model; None, with the mistakes noted, if it is not sound."""
+        """Return the file as a model, or None, with the mistakes added, if it is not valid."""
         if not self.marked.readable:
             return None
         try:
@@ -159,7 +159,7 @@ class _File:
 
 
 class _Schema:
-    """What a model allows at each path, in an operator's words, from its JSON schema."""
+    """Explanation of pydantic's errors in plain words, from the JSON schema of a model."""
 
     def __init__(self, file: _File, model: type[Section]) -> None:
         self.file, self.marked = file, file.marked
@@ -167,19 +167,19 @@ class _Schema:
         self.misspelt: set[KeyPath] = set()
 
     def explain(self, error: ValidationError) -> None:
-        """Note each error of pydantic's at its place."""
+        """Add a mistake for each error of pydantic, at its position."""
         missing = list(self._missing_axes())
         for item in error.errors(include_url=False):
             path = _path(item["loc"], self.marked.data, item["type"])
             if not any(path[:depth] in self.marked.refused for depth in range(len(path) + 1)):
                 missing += self._note(path, item["type"], item)
         for path in missing:
-            # A key that is there under a misspelt name has been reported as such.
+            # A misspelt key has been reported as such.
             if path not in self.misspelt and path not in self.marked.keys:
                 self.file.add(path, f"is missing; allowed: {self._words(self._node(path))}")
 
     def _note(self, path: KeyPath, kind: str, item: Mapping[str, Any]) -> list[KeyPath]:
-        """Note one error; returns the paths of missing keys instead."""
+        """Add one mistake; of missing keys, return the paths instead."""
         if kind == "missing":
             return [path]
         if kind in ("union_tag_invalid", "union_tag_not_found"):
@@ -194,7 +194,7 @@ class _Schema:
         return []
 
     def _missing_axes(self) -> Iterator[KeyPath]:
-        """Axes that a sweep lacks: pydantic sees them only once the others are sound."""
+        """Yield axes that a sweep lacks, which pydantic reports only if the others are valid."""
         sweeps = self.marked.get(("sweeps",))
         for k, sweep in enumerate(sweeps if isinstance(sweeps, list) else []):
             if sweep == {}:
@@ -212,7 +212,7 @@ class _Schema:
         self.file.add(path, text, self.marked.keys.get(path))
 
     def _no_form(self, path: KeyPath) -> list[KeyPath]:
-        """Neither form of a union; a block's driver is missing or unknown."""
+        """Add the mistake of a block whose driver is unknown; return the path of a missing one."""
         if not isinstance(self.marked.get(path), dict):
             self._wrong_value(path, "type")
             return []
@@ -253,7 +253,7 @@ class _Schema:
         return [n for n in options if n.get("type") != "null"]
 
     def _form(self, node: dict[str, Any], value: object) -> dict[str, Any]:
-        """The form of a union that the value has; the union itself if that is open."""
+        """Return the member of a union that the value belongs to; the union itself if undecided."""
         if "discriminator" in node:
             driver = value.get("driver") if isinstance(value, dict) else None
             drivers = node["discriminator"]["mapping"]
@@ -322,16 +322,16 @@ def _what_stands(value: object, kind: str) -> str:
     if kind in _TOO:
         return f"{shown(value)} {_TOO[kind]}"
     if value is None or isinstance(value, list | dict):
-        return f"{kind_of(value)} stands here"
+        return f"{kind_of(value)} is given"
     if isinstance(value, float) and kind == "int_type":
         return f"{shown(value)} is not a whole number"
-    # Not the operator's fault: many programs read 5e-3 as a number, YAML 1.1 does not.
+    # Many programs read 5e-3 as a number, but YAML 1.1 does not.
     rule = isinstance(value, str) and value == plain_value(value) and number_hint(value)
     return f"{shown(value)} is {kind_of(value)}{' by the rules of YAML' if rule else ''}"
 
 
 def _hint(value: object, options: list[dict[str, Any]]) -> str | None:
-    """What to write instead, where that can be told from what stands there."""
+    """Return advice on what to write instead, if the value suggests any."""
     forms = {node.get("type"): node for node in options}
     if "number" in forms or "integer" in forms:
         return _number_instead(value, whole="number" not in forms)
@@ -355,7 +355,7 @@ def _number_instead(value: object, *, whole: bool) -> str | None:
 
 
 def _path(loc: tuple[str | int, ...], data: object, kind: str) -> KeyPath:
-    """The path in the file: pydantic's, without the names of the forms of unions."""
+    """Return pydantic's path without the names of the members of unions."""
     path: list[str | int] = []
     value = data
     for k, key in enumerate(loc):

@@ -1,7 +1,7 @@
-"""The protocol file: what to measure on which sample, in an operator's words.
+"""Protocol file: the sample, the geometries to measure, references and fit.
 
-pydantic models (strict, frozen, unknown keys refused), and what a protocol asks of its rig; read
-them with `instrument.config.load`.
+pydantic models, and the checks across values of a protocol and against its rig;
+`instrument.config.load` reads them from YAML.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SampleSize = Annotated[float, Field(gt=0, le=500)]
 
 
 class Sample(Section):
-    """The flat sample on the stage."""
+    """Flat sample on the stage."""
 
     name: Name
     width_mm: SampleSize
@@ -35,21 +35,21 @@ class Sample(Section):
 
 
 class Steps(Section):
-    """Evenly spaced angles: `num` of them from `start` to `stop`, both included."""
+    """Evenly spaced angles: `num` values from `start` to `stop`, both included."""
 
     start: Degrees
     stop: Degrees
     num: Annotated[int, Field(ge=1, le=100_000)]
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """One angle has start = stop, many have not."""
+        """Require start == stop for num = 1, and start != stop for more."""
         if self.num == 1 and self.start != self.stop:
             yield "num", f"1; allowed: 2 or more from {self.start:g} to {self.stop:g}"
         if self.num > 1 and self.start == self.stop:
             yield "num", f"{self.num}; allowed: 1, as start = stop = {self.start:g}"
 
 
-FORMS_OF_ANGLES = ("<list>", "<steps>")  # no one names a key so
+FORMS_OF_ANGLES = ("<list>", "<steps>")  # no key has such a name
 
 
 def _form_of_angles(angles: object) -> str | None:
@@ -59,7 +59,7 @@ def _form_of_angles(angles: object) -> str | None:
 
 
 AngleList = Annotated[list[Degrees], Field(min_length=1)]
-# Told apart by what stands in the file, so that a mistake is reported for that form alone.
+# Discriminated by the form in the file, so that a mistake is reported for that form only.
 Angles = Annotated[
     Annotated[AngleList, Tag("<list>")] | Annotated[Steps, Tag("<steps>")],
     Discriminator(_form_of_angles),
@@ -68,26 +68,26 @@ SweepConfig = Annotated[dict[SweepKey, Angles], Field(min_length=3)]
 
 
 def angles_deg(angles: list[float] | Steps) -> FloatArray:
-    """The angles of one axis of a sweep, in degrees, in the order given."""
+    """Return the angles (N,) of one axis of a sweep in degrees, in the order of the file."""
     if isinstance(angles, Steps):
         return np.linspace(angles.start, angles.stop, angles.num)
     return np.asarray(angles, dtype=np.float64)
 
 
 class PatchConfig(Section):
-    """The patch of the sample that counts, centred on the rotation axis."""
+    """Measured patch of the sample, centred on the rotation axis."""
 
     width_mm: Positive
     height_mm: Positive
     min_pixels: Annotated[int, Field(ge=1, le=100_000_000)] = 100
 
 
-# At 90 degrees there is nothing to see, nor light to see it by.
+# At 90 degrees the sample is neither visible nor lit.
 ViewAngle = Annotated[float, Field(ge=-89.5, le=89.5)]
 
 
 class WhiteTile(Section):
-    """The reference: a diffuser of known reflectance, measured for every place of the lamp."""
+    """Reference diffuser of known reflectance, measured at every position of the lamp."""
 
     reflectance: Annotated[float, Field(gt=0, le=1)]
     u_reflectance: NotNegative
@@ -95,7 +95,7 @@ class WhiteTile(Section):
     frames: Annotated[int, Field(ge=1, le=10_000)] = 16
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """A certificate is better than no certificate."""
+        """Refuse an uncertainty of half the reflectance or more: it was probably given in %."""
         if self.u_reflectance >= self.reflectance / 2:
             yield (
                 "u_reflectance",
@@ -105,38 +105,41 @@ class WhiteTile(Section):
 
 
 class DriftCheck(Section):
-    """One geometry of the sample, measured again and again, to follow the lamp."""
+    """Geometry of the sample that is measured repeatedly to follow the lamp's drift."""
 
     theta_r_deg: ViewAngle = 0.0
     every_points: Annotated[int, Field(ge=1, le=1_000_000)] = 25
 
 
 class References(Section):
-    """What ties the radiance down; without a white tile it stays relative."""
+    """References of the scan; without a white tile the radiance stays relative."""
 
     white_tile: WhiteTile | None = None
     drift_check: DriftCheck | None = None
 
 
 class FitConfig(Section):
-    """What to fit; the default is every model of the ladder.
+    """Models to fit; by default all models of the ladder.
 
-    `method`: how the rough surface is worked out; auto: as cheaply as the data allow.
+    `method` of computing a rough surface; auto: the cheapest that is accurate enough for the data.
     """
 
     models: Annotated[list[Name], Field(min_length=1)] | None = None
     method: Literal["auto", "qualitative", "functional", "exact"] = "auto"
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """A model's name says its method."""
+        """Refuse a method beside `models`, whose names already state it."""
         if self.models is not None and self.method != "auto":
-            yield "method", f"{self.method}; allowed: auto, as `models` names the methods"
+            yield (
+                "method",
+                f"{self.method}; allowed: auto, as `models` names the methods",
+            )
 
 
 class SimulatedSample(Section):
-    """What the sample of a simulated rig really is: ignored by real rigs, never seen by the fit.
+    """True reflectance of the sample on a simulated rig; real rigs and the fit ignore it.
 
-    `method`: how its reflectance is worked out; auto: as cheaply as the picture allows.
+    `method` of computing its reflectance; auto: the cheapest that is accurate enough for the image.
     `mottling`: relative standard deviation of the albedo over the surface, in patches of
     `mottling_size_mm`.
     """
@@ -149,7 +152,7 @@ class SimulatedSample(Section):
 
 
 class Protocol(Section):
-    """A whole protocol file."""
+    """Complete protocol file."""
 
     name: Name
     description: str = ""
@@ -182,9 +185,9 @@ _PARAMETERS: TypeAdapter[Any] = TypeAdapter(dict[str, Finite])
 
 
 def rig_mistakes(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -> Mistakes:
-    """What the protocol asks and this rig cannot do: path in the protocol, and what is wrong.
+    """Yield what the rig cannot do of the protocol: path in the protocol, and message.
 
-    Works on parts of both files that are sound by themselves, whatever is wrong elsewhere.
+    Values that are valid by themselves are checked even if others in the files are not.
     """
     for axis in AXES:
         limits = _sound(_AXIS, rig, "axes", axis)
@@ -203,18 +206,18 @@ def rig_mistakes(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -> Mistak
         rig.get(("camera", "device")) == EMULATED
     )
     if scene and protocol.get(("simulated_sample",)) is None:
-        text = f"is missing; the rig {rig_name} is simulated and needs to know what to show"
+        text = f"is missing; the rig {rig_name} is simulated and needs a sample to render"
         yield ("simulated_sample",), text
 
 
 def own_mistakes(protocol: MarkedYaml, check_model: ModelCheck | None) -> Mistakes:
-    """What does not go together within a protocol: path, and what is wrong.
+    """Yield the values of a protocol that contradict one another: path and message.
 
-    `check_model(name, parameters or None)` says what is wrong with a model's name or parameters.
+    `check_model(name, parameters or None)` returns what is wrong with a model, or None.
     """
     for axis, (low, high) in _GEOMETRY_DEG.items():
         for path, value in _written_angles(protocol, axis):
-            # The schema has its own say on the references.
+            # The models already limit the angles of the references.
             if path[0] == "sweeps" and _impossible(axis, value):
                 yield path, f"{value:g} deg; allowed: {low:g} to {high:g} deg from the normal"
     for key in ("width_mm", "height_mm"):
@@ -245,7 +248,7 @@ def _items(value: object) -> int:
 
 
 def _written_angles(protocol: MarkedYaml, axis: str) -> Iterator[tuple[KeyPath, float]]:
-    """Sound angles as they stand in the file: lists whole, steps by their ends."""
+    """Yield path and value of the valid angles in the file: whole lists, and ends of steps."""
     paths: list[KeyPath] = []
     for sweep in range(_items(protocol.get(("sweeps",)))):
         angles: KeyPath = ("sweeps", sweep, f"{axis}_deg")
@@ -288,7 +291,7 @@ def _window_past_picture(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -
 
 
 def _repeated(protocol: MarkedYaml) -> Mistakes:
-    """Angles that stand twice in a sweep, and geometries that stand in two sweeps."""
+    """Yield angles that a sweep repeats, and geometries that two sweeps share."""
     sweeps: dict[int, list[list[float] | Steps]] = {}
     for sweep in range(_items(protocol.get(("sweeps",)))):
         paths: list[KeyPath] = [("sweeps", sweep, f"{axis}_deg") for axis in AXES]
@@ -298,7 +301,7 @@ def _repeated(protocol: MarkedYaml) -> Mistakes:
                 yield from _twice(path, angles)
         if all(angles is not None for angles in axes):
             sweeps[sweep] = axes
-    # Counted before they are laid out: a short file can ask for more than fits into memory.
+    # Counted before they are expanded: a short file can request more than fits into memory.
     total = sum(math.prod(map(_count, axes)) for axes in sweeps.values())
     if total > MAX_GEOMETRIES:
         yield ("sweeps",), f"{total} geometries; allowed: at most {MAX_GEOMETRIES} in a protocol"
@@ -315,7 +318,7 @@ def _twice(path: KeyPath, angles: list[float]) -> Mistakes:
     for k, angle in enumerate(angles):
         earlier = first.setdefault(round(angle, 6), k)
         if earlier != k:
-            text = f"{angle:g} deg stands already in [{earlier}] of this list; allowed: each once"
+            text = f"{angle:g} deg is already in [{earlier}] of this list; allowed: each once"
             yield (*path, k), text
 
 
@@ -332,7 +335,7 @@ def _shared(sweeps: dict[int, list[list[float] | Steps]]) -> Mistakes:
             example = ", ".join(f"{axis} {value:g}" for axis, value in values)
             yield (
                 ("sweeps", sweep),
-                f"{len(geometries)} of its geometries stand already in sweeps[{earlier}], such as "
+                f"{len(geometries)} of its geometries are already in sweeps[{earlier}], such as "
                 f"{example} deg; allowed: each once",
             )
 

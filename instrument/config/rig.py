@@ -1,6 +1,6 @@
-"""The rig file: what stands on the bench, in an operator's words and with units in every name.
+"""Rig file: geometry, axes, camera and lamp of an instrument, with the unit in every name.
 
-pydantic models (strict, frozen, unknown keys refused); read them with `instrument.config.load`.
+pydantic models; `instrument.config.load` reads them from YAML.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Range = Annotated[list[Finite], Field(min_length=2, max_length=2)]
 
 
 class KeepOut(Section):
-    """Where no axis may pass: a box of axis angles, or a cone about the lamp's direction."""
+    """Forbidden zone: a box of axis angles, or a cone around the direction of the lamp."""
 
     name: Name
     theta_i_deg: Range | None = None
@@ -29,7 +29,7 @@ class KeepOut(Section):
     camera_to_lamp_deg: Positive | None = None
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """A box or a cone, and each range in order."""
+        """Require either a box or a cone, and the limits of each range in order."""
         ranges = {key: getattr(self, key) for key in _RANGES}
         box = {key: pair for key, pair in ranges.items() if pair is not None}
         if bool(box) == (self.camera_to_lamp_deg is not None):
@@ -44,12 +44,11 @@ class KeepOut(Section):
 
 
 class LampConfig(Section):
-    """The lamp; `shutter` darkens it by itself, `hand` asks the operator to cover it.
+    """Lamp; a `shutter` darkens it, or the operator covers it by `hand`.
 
-    A `manual` lamp is a real one that a person serves.
-
-    `white_electrons_per_s`: what a pixel collects from a perfect white diffuser lit at normal
-    incidence: from it the first exposure and the duration of a scan are predicted.
+    A `manual` lamp is a real one without a driver. `white_electrons_per_s`: electrons that a pixel
+    collects from a perfect white diffuser at normal incidence; it predicts the first exposure and
+    the duration of a scan.
     """
 
     driver: Literal["simulated", "manual"]
@@ -59,15 +58,15 @@ class LampConfig(Section):
     white_electrons_per_s: Positive
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """A real lamp has no shutter that this program could drive."""
+        """Refuse a shutter on a manual lamp: no driver would operate it."""
         if self.driver == "manual" and self.darkened_by != "hand":
             yield "darkened_by", f"{self.darkened_by}; allowed for a manual lamp: hand"
 
 
 class Simulation(Section):
-    """What a simulated rig has and nobody tells the operator: seed, drift, a sample off the axis.
+    """Hidden properties of a simulated rig: noise seed, lamp drift, position of the sample.
 
-    `sample_height_mm`: how far the surface stands off the rotation axis, towards the camera.
+    `sample_height_mm`: distance of the surface from the rotation axis, towards the camera.
     `lamp_drift_per_hour`: relative change of the lamp's output.
     """
 
@@ -78,7 +77,7 @@ class Simulation(Section):
 
 
 class Rig(Section):
-    """A whole rig file."""
+    """Complete rig file."""
 
     name: Name
     description: str = ""
@@ -96,15 +95,15 @@ class Rig(Section):
     simulation: Simulation = Simulation()
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """One scene for all: simulated, emulated or real devices do not mix."""
+        """Require all devices to be simulated, all emulated or all real: they share one scene."""
         kinds = dict(self._kinds())
         if len(set(kinds.values())) > 1:
             what = ", ".join(f"{name} is {kind}" for name, kind in kinds.items())
             yield "axes", f"{what}; allowed: all simulated, all emulated or all real"
-        yield from self._ports_at_odds()
+        yield from self._port_conflicts()
 
-    def _ports_at_odds(self) -> Iterator[tuple[str, str]]:
-        """Axes on one port: of one kind, each at an address of its own."""
+    def _port_conflicts(self) -> Iterator[tuple[str, str]]:
+        """Require one kind of driver per port, and a different address for each axis on it."""
         axes = {name: self.axes[name] for name in AXES}
         wired = {n: a for n, a in axes.items() if isinstance(a, Wired) and a.port != EMULATED}
         for (one, first), (other, second) in combinations(wired.items(), 2):
@@ -133,20 +132,20 @@ class Rig(Section):
 
     @property
     def kind(self) -> str:
-        """In a word: simulated, emulated or real."""
+        """Kind of all devices: "simulated", "emulated" or "real"."""
         return "simulated" if self.simulated else "emulated" if self.emulated else "real"
 
     @property
     def emulated(self) -> bool:
-        """Whether real drivers talk to emulated devices."""
+        """True if the real drivers are connected to emulated devices."""
         return not self.simulated and getattr(self.camera, "device", "") == EMULATED
 
     @property
     def simulated(self) -> bool:
-        """Whether the devices are simulated as a whole."""
+        """True if the devices are simulated, without drivers."""
         return isinstance(self.camera, SimulatedCameraConfig)
 
     @property
     def real(self) -> bool:
-        """Whether there is a bench; else a simulated scene, which also answers the prompts."""
+        """True for real hardware; otherwise a simulated scene also answers the prompts."""
         return not self.simulated and not self.emulated

@@ -1,4 +1,4 @@
-"""The bytes of a YAML file; where there is none, what its folder holds instead."""
+"""Reading of a YAML file; the error for a missing one suggests similar names."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from instrument.text.quoting import printable
 
 
 def yaml_bytes(path: Path) -> bytes:
-    """What it holds, up to one byte past MAX_BYTES. Raises `InputError` with what is near."""
+    """Return the bytes of a file, at most one more than MAX_BYTES. Raises `InputError`."""
     try:
         return read_file(path, MAX_BYTES)
     except FileNotFoundError:
-        problem = f"no such file; {_near(path)}"
+        problem = f"no such file; {_suggestion(path)}"
     except IsADirectoryError:
-        problem = f"is a folder; allowed: a YAML file; {_near(path / 'x.yaml')}"
+        problem = f"is a folder; allowed: a YAML file; {_suggestion(path / 'x.yaml')}"
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         problem = f"cannot be read: {reason}; check its name and permissions"
     raise InputError(f"{printable(str(path))}: {problem}")
 
 
-def _near(path: Path) -> str:
-    """Files in the folder of a missing one, those of a similar name if there are such."""
+def _suggestion(path: Path) -> str:
+    """Return the YAML files beside a missing one, only those of a similar name if there are any."""
     try:
         names = sorted(p.name for p in path.parent.iterdir() if p.is_file())
     except OSError:
-        return f"there is no folder {printable(str(path.parent))} to be read either"
+        return f"there is no readable folder {printable(str(path.parent))} either"
     yaml_names = [name for name in names if name.endswith((".yaml", ".yml"))]
     stems = {name.rpartition(".")[0]: name for name in yaml_names}
     close = [stems[stem] for stem in difflib.get_close_matches(path.stem, stems, n=3)]

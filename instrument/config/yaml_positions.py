@@ -1,10 +1,10 @@
 """YAML as plain data, with the line and column of every key and value.
 
-Read is only what all versions of YAML agree on, so that a file means the same in every program:
-a plain word is text unless it is `true`, `false`, `null`, `~` or a decimal number such as `12`,
-`-0.5` or `5.0e-3`. Text that only looks like a number (`5e-3`, `1:30`, `1_000`, `010`) stays
-text; `number_hint` says how to write the number. Tags, anchors, aliases, merge keys and double
-keys are mistakes; all mistakes of a text are collected, none is raised.
+Only what all versions of YAML agree on is read, so that a file means the same in every program: a
+plain word is text unless it is `true`, `false`, `null`, `~` or a decimal number such as `12`,
+`-0.5` or `5.0e-3`. Text that only looks like a number (`5e-3`, `1:30`, `1_000`, `010`) stays text;
+`number_hint` suggests how to write the number. Tags, anchors, aliases, merge keys and duplicate
+keys are mistakes. All mistakes are collected; none is raised.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from instrument.text.terminal_safe import first_unfit
 
 KeyPath = tuple[str | int, ...]
 
-MAX_BYTES = 256 * 1024  # some 40 000 angles
+MAX_BYTES = 256 * 1024  # about 40 000 angles
 MAX_DEPTH = 16  # the schema needs six
 _MAX_NUMBER = 100  # characters: Python itself refuses whole numbers of more than 4300 digits
 
@@ -29,7 +29,7 @@ _WORDS = {"true": True, "false": False, "null": None, "~": None, "": None}
 _NOT_FINITE = {".inf", "+.inf", "-.inf", ".nan"}
 _WHOLE = re.compile(r"[-+]?(0|[1-9][0-9]*)")
 _DECIMAL = re.compile(r"([-+]?[0-9]+\.[0-9]*|\.[0-9]+)([eE][-+][0-9]+)?")
-# A number as people write it: 1_000, 010, 5e-3, 0,5, 12 mm, 30°.
+# A number in an everyday form: 1_000, 010, 5e-3, 0,5, 12 mm, 30°.
 _LOOKS = re.compile(
     r"(?P<sign>[-+]?)(?P<whole>[0-9][0-9_]*|(?=[.,][0-9]))(?:[.,](?P<part>[0-9_]*))?"
     r"(?:[eE](?P<e_sign>[-+]?)(?P<exponent>[0-9]+))?(?P<unit>\s*(?:[^\W\d_]{1,4}|[°%]))?"
@@ -46,7 +46,7 @@ _HINTS = {
 
 
 class Mark(NamedTuple):
-    """A place in a text: line and column, both from 1."""
+    """Position in a text: line and column, both from 1."""
 
     line: int
     column: int
@@ -54,7 +54,7 @@ class Mark(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Mistake:
-    """What is wrong with the YAML itself, and where."""
+    """Mistake in the YAML itself, with its position."""
 
     mark: Mark
     path: KeyPath
@@ -63,11 +63,11 @@ class Mistake:
 
 @dataclass(slots=True)
 class MarkedYaml:
-    """The data of a YAML text, where each part of it stands, and what is wrong with it.
+    """Data of a YAML text, with positions and mistakes.
 
-    `values` and `keys` give the place of a value and of its key by path; `refused` are the paths
-    whose value could not be taken (it is None in `data`); `readable` is False if `data` is empty
-    because the text could not be read at all.
+    `values` and `keys`: position of each value and of its key, by path. `refused`: paths whose
+    value was not accepted and is None in `data`. `readable`: False if the text could not be read at
+    all, so that `data` is empty.
     """
 
     text: str = ""
@@ -79,11 +79,11 @@ class MarkedYaml:
     readable: bool = False
 
     def add(self, mark: Mark, path: KeyPath, text: str) -> None:
-        """Note a mistake."""
+        """Add a mistake."""
         self.mistakes.append(Mistake(mark, path, text))
 
     def get(self, path: KeyPath) -> object:
-        """The value at `path`; None if there is none."""
+        """Return the value at `path`, None if there is none."""
         value: object = self.data
         for key in path:
             if isinstance(value, dict):
@@ -95,20 +95,20 @@ class MarkedYaml:
         return value
 
     def mark(self, path: KeyPath) -> Mark:
-        """The place of the value at `path`, or of the innermost block around it."""
+        """Return the position of the value at `path`, or of the innermost block around it."""
         while path and path not in self.values:
             path = path[:-1]
         return self.values.get(path, Mark(1, 1))
 
 
 def place(file: Path, text: str, at: KeyPath) -> str:
-    """`file:line:column: path` of a value in a text that was read before."""
+    """Return `file:line:column: path` of a value in a text that has been read before."""
     mark = read_yaml(text.encode()).mark(at)
     return f"{file}:{mark.line}:{mark.column}: {dotted(at)}"
 
 
 def read_yaml(raw: bytes) -> MarkedYaml:
-    """Read one YAML document that is a block of keys; raises nothing, see `MarkedYaml.mistakes`."""
+    """Read one YAML document, a block of keys; mistakes are in the result, none is raised."""
     found = MarkedYaml()
     if len(raw) > MAX_BYTES:
         found.add(Mark(1, 1), (), f"the file is too large; allowed: {MAX_BYTES // 1024} kB")
@@ -128,7 +128,7 @@ def read_yaml(raw: bytes) -> MarkedYaml:
 
 
 def plain_value(text: str) -> object:
-    """What a plain (unquoted) YAML word means: a boolean, None, an int, a float or the text."""
+    """Return the value of a plain (unquoted) word: a boolean, None, an int, a float or the text."""
     if text in _WORDS:
         return _WORDS[text]
     if text in _NOT_FINITE:
@@ -141,7 +141,7 @@ def plain_value(text: str) -> object:
 
 
 def number_hint(text: str, *, whole: bool = False) -> str | None:
-    """How to write the number that `text` seems to mean; None if it does not look like one."""
+    """Return advice on how to write the number that `text` seems to mean; None if it is none."""
     text = text.strip()
     if len(text) > _MAX_NUMBER:
         return None
@@ -177,7 +177,7 @@ class _TooDeepError(Exception):
 
 
 class _Reader:
-    """Turns the parser's events into data; blocks nest by recursion, at most MAX_DEPTH deep."""
+    """Converter of the parser's events to data; recursive, at most MAX_DEPTH levels."""
 
     def __init__(self, found: MarkedYaml) -> None:
         self.found = found
@@ -190,7 +190,7 @@ class _Reader:
             self.events = iter(yaml.parse(found.text, Loader=yaml.SafeLoader))
             data = self._document()
         except yaml.reader.ReaderError as error:
-            text = f"character {error.character!r} is not allowed; take it out"
+            text = f"character {error.character!r} is not allowed; remove it"
             found.add(_mark_of(found.text, error.position), (), text)
         except yaml.MarkedYAMLError as error:
             found.add(*_syntax(error))
@@ -198,8 +198,8 @@ class _Reader:
             text = f"nested too deeply; allowed: {MAX_DEPTH} levels"
             found.add(error.mark, error.path[:4], text)
         except (ValueError, OverflowError):
-            # The parser lets these through for an escape or a version number past Python's range.
-            found.add(self.last, (), "YAML cannot be read after this place: a number is too large")
+            # The parser raises these for an escape or a version number beyond Python's range.
+            found.add(self.last, (), "YAML cannot be read from here on: a number is too large")
         else:
             self._take(data)
 
@@ -223,14 +223,14 @@ class _Reader:
         data = self._value(self._next(), ())
         self._next()
         if isinstance(self._next(), yaml.DocumentStartEvent):
-            self.found.add(self.last, (), "a second document begins; allowed: one in a file")
+            self.found.add(self.last, (), "a second document begins; allowed: one per file")
         return data
 
     def _value(self, event: yaml.Event, path: KeyPath) -> object:
         mark = self.found.values[path] = _mark(event)
         self._refuse_extras(event, path)
         if isinstance(event, yaml.AliasEvent):
-            text = f"alias *{str(event.anchor)[:40]} is not read; write the value out"
+            text = f"alias *{str(event.anchor)[:40]} is not supported; write the value itself"
             self.found.add(mark, path, text)
             self.found.refused.add(path)
             return None
@@ -257,7 +257,7 @@ class _Reader:
         return block
 
     def _key(self, event: yaml.Event, path: KeyPath) -> str | None:
-        """The key, always as text, or None with its mistake noted if it cannot be taken."""
+        """Return the key as text, or None, with a mistake added, if it is not accepted."""
         mark = _mark(event)
         if not isinstance(event, yaml.ScalarEvent):
             self.found.add(mark, path, "a key must be one word, not a block, a list or an alias")
@@ -266,11 +266,11 @@ class _Reader:
         key: str = event.value
         self._refuse_extras(event, (*path, key))
         if key == "<<" and event.style is None:
-            self.found.add(mark, path, "merge key << is not read; write the keys out")
+            self.found.add(mark, path, "merge key << is not supported; write the keys themselves")
             return None
         first = self.found.keys.setdefault((*path, key), mark)
         if first is not mark:
-            text = f"the key stands twice, first at line {first.line}, column {first.column}"
+            text = f"duplicate key, first at line {first.line}, column {first.column}"
             self.found.add(mark, (*path, key), f"{text}; keep one of them")
             return None
         return key
@@ -290,30 +290,30 @@ class _Reader:
         tag = getattr(event, "tag", None)
         if tag is not None:
             self.found.add(
-                _mark(event), path, f"tag {tag[:40]!r} is not read; write the plain value"
+                _mark(event), path, f"tag {tag[:40]!r} is not supported; write the plain value"
             )
             self.found.refused.add(path)
         anchor = getattr(event, "anchor", None)
         if anchor is not None and not isinstance(event, yaml.AliasEvent):
-            self.found.add(_mark(event), path, f"anchor &{anchor[:40]} is not read; take it out")
+            self.found.add(_mark(event), path, f"anchor &{anchor[:40]} is not supported; remove it")
         text = getattr(event, "value", "")
         unfit = first_unfit(text)
         if unfit is not None:
-            # An escape such as "\ud800" gives text that cannot be written to any file, one such as
-            # "\x1b[2J" a command to the terminal that shows it.
+            # An escape such as "\ud800" gives text that no file can hold, "\x1b[2J" a command to
+            # the terminal that displays it.
             half = "half a character" if "\ud800" <= unfit <= "\udfff" else "a control character"
             what = f"{text[:40]!r} holds {half} ({repr(unfit)[1:-1]})"
-            self.found.add(_mark(event), path, f"{what}; take it out")
+            self.found.add(_mark(event), path, f"{what}; remove it")
             self.found.refused.add(path)
 
 
 def is_number(value: object) -> bool:
-    """Whether a value from YAML is a number; true and false are none."""
+    """Return True for a number; true and false are not numbers."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def kind_of(value: object) -> str:
-    """What a value from YAML is, in an operator's words."""
+    """Return the kind of a value from YAML in words, with its article."""
     if value is None:
         return "nothing"
     for kind, words in (
@@ -328,7 +328,7 @@ def kind_of(value: object) -> str:
 
 
 def dotted(path: KeyPath) -> str:
-    """A path as in `sweeps[0].theta_r_deg.num`; keys that are no plain words in quotes."""
+    """Return a path as `sweeps[0].theta_r_deg.num`, with unusual keys in quotes."""
     text = ""
     for key in path:
         if isinstance(key, int):

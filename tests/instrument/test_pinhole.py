@@ -10,7 +10,15 @@ from hypothesis import strategies as st
 from instrument.geometry import camera_direction
 from instrument.pinhole import Pinhole, apply_homography, area_per_pixel_mm2, rectangle_mm
 
-CAMERA = Pinhole(800.0, 72.0, 640, 512, 317.0, 257.5, 0.4)
+CAMERA = Pinhole(
+    beam_length_mm=800.0,
+    field_width_mm=72.0,
+    width_px=640,
+    height_px=512,
+    axis_column_px=317.0,
+    axis_row_px=257.5,
+    roll_deg=0.4,
+)
 VIEW = st.floats(-85, 85)
 
 
@@ -20,7 +28,15 @@ def test_the_rotation_axis_always_appears_at_its_pixel(theta_r: float) -> None:
 
 
 def test_the_picture_shows_the_field_width_at_normal_view() -> None:
-    upright = Pinhole(800.0, 72.0, 640, 512, 319.5, 255.5, 0.0)
+    upright = Pinhole(
+        beam_length_mm=800.0,
+        field_width_mm=72.0,
+        width_px=640,
+        height_px=512,
+        axis_column_px=319.5,
+        axis_row_px=255.5,
+        roll_deg=0.0,
+    )
     left, right = upright.project([[-36.0, 0.0], [36.0, 0.0]], 0.0)
     assert right[0] - left[0] == pytest.approx(640.0)
     assert upright.project([0.0, 10.0], 0.0)[1] < 255.5  # y is up, rows grow downwards
@@ -28,7 +44,15 @@ def test_the_picture_shows_the_field_width_at_normal_view() -> None:
 
 @given(VIEW)
 def test_foreshortening_is_the_cosine_of_the_view_angle(theta_r: float) -> None:
-    upright = Pinhole(1e6, 72.0, 640, 512, 319.5, 255.5, 0.0)  # so far that perspective is gone
+    upright = Pinhole(
+        beam_length_mm=1e6,
+        field_width_mm=72.0,
+        width_px=640,
+        height_px=512,
+        axis_column_px=319.5,
+        axis_row_px=255.5,
+        roll_deg=0.0,
+    )  # so far that perspective is gone
     a, b = upright.project([[-1.0, 0.0], [1.0, 0.0]], theta_r)
     across = 2 * 640 / 72 * np.cos(np.radians(theta_r))
     assert b[0] - a[0] == pytest.approx(across, rel=1e-4)

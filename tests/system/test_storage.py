@@ -23,7 +23,6 @@ from instrument.clock import Clock
 from instrument.errors import StorageError
 from instrument.record.reading import Reading
 from instrument.record.record import Record
-from instrument.text.atomic_file import write_whole
 from tests.support.command import gonio
 from tests.support.paths import CONFIGS, ROOT
 from tests.support.scans import small_scan, undated
@@ -215,19 +214,3 @@ def test_a_read_only_folder_is_named_and_what_is_in_it_stays(
         assert "cannot be written" in done.stderr
         assert "look at the folder's permissions" in done.stderr
         assert "Traceback" not in done.stderr
-
-
-def test_a_file_is_written_whole_or_its_old_self_stays(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "fit.json"
-    write_whole(path, "old")
-
-    def full(number: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(StorageError, match=r"fit\.json: the disk is full .*make room"):
-        write_whole(path, "new")
-    assert path.read_text() == "old"
-    assert [p.name for p in tmp_path.iterdir()] == ["fit.json"]

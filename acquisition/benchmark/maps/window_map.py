@@ -36,8 +36,30 @@ class Camera(NamedTuple):
 
 
 CAMERAS = (
-    Camera("bench_12bit", Pinhole(800.0, 72.0, 640, 512, 317.0, 257.5, 0.4)),
-    Camera("paper_1995", Pinhole(1828.8, 90.0, 512, 480, 255.5, 239.5, 0.0)),
+    Camera(
+        "bench_12bit",
+        Pinhole(
+            beam_length_mm=800.0,
+            field_width_mm=72.0,
+            width_px=640,
+            height_px=512,
+            axis_column_px=317.0,
+            axis_row_px=257.5,
+            roll_deg=0.4,
+        ),
+    ),
+    Camera(
+        "paper_1995",
+        Pinhole(
+            beam_length_mm=1828.8,
+            field_width_mm=90.0,
+            width_px=512,
+            height_px=480,
+            axis_column_px=255.5,
+            axis_row_px=239.5,
+            roll_deg=0.0,
+        ),
+    ),
 )
 """Those of the rigs that the program comes with: written here, as a bench may be run far from the
 folder of the rig files."""

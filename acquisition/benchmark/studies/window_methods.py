@@ -29,7 +29,15 @@ from instrument.pinhole import (
 )
 
 PATCH_MM = 20.0
-CAMERA = Pinhole(800.0, 72.0, 640, 512, 317.0, 257.5, 0.4)
+CAMERA = Pinhole(
+    beam_length_mm=800.0,
+    field_width_mm=72.0,
+    width_px=640,
+    height_px=512,
+    axis_column_px=317.0,
+    axis_row_px=257.5,
+    roll_deg=0.4,
+)
 """The camera of the demonstration: bench_12bit."""
 FRAMES_PX = ((160, 128), (640, 512), (1280, 1024))
 ANGLES_DEG = ((0.0, 40.0), (40.0, 70.0), (70.0, 80.0))

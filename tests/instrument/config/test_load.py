@@ -1,102 +1,16 @@
-"""Loading protocols with their rigs: what comes back, which files are read, what is told."""
+"""Loading protocols with their rigs: which files are read, what is returned, what is reported."""
 
-import os
 from pathlib import Path
 
 import pytest
 import yaml
 
 from instrument.config.axes import HandAxis
-from instrument.config.load import MAX_REPORTED, Loaded, load_protocol, load_rig
+from instrument.config.load import MAX_REPORTED, load_protocol, load_rig
 from instrument.config.protocol import Protocol, Steps
 from instrument.errors import InputError
-
-RIG = """\
-name: small
-beam_length_mm: 800.0
-lamp_distance_mm: 1000
-source_solid_angle_sr: 0.0005
-receiver_solid_angle_sr: 0.0003
-axes:
-  theta_i: {driver: hand, min_deg: 0.0, max_deg: 80.0, u_deg: 0.1}
-  dphi: {driver: hand, min_deg: 0.0, max_deg: 180.0, u_deg: 0.1}
-  theta_r:
-    driver: simulated
-    min_deg: -88.0
-    max_deg: 88.0
-    speed_deg_per_s: 20.0
-    acceleration_deg_per_s2: 40.0
-    settle_s: 0.3
-    u_deg: 0.02
-keep_out:
-  - {name: post, theta_r_deg: [-90.0, -87.0]}
-camera:
-  driver: simulated
-  width_px: 640
-  height_px: 320
-  field_width_mm: 72.0
-  axis_row_px: 160.0
-  axis_column_px: 320.0
-  bit_depth: 12
-  full_well_electrons: 30000.0
-  read_noise_electrons: 8.0
-  dark_current_electrons_per_s: 20.0
-  black_level_dn: 64.0
-  min_exposure_s: 0.0005
-  max_exposure_s: 2.0
-  frame_overhead_s: 0.02
-lamp: {driver: simulated, darkened_by: shutter, white_electrons_per_s: 600000.0}
-"""
-
-PROTOCOL = """\
-name: foam
-rig: rig.yaml
-sample: {name: foam, width_mm: 50.0, height_mm: 50.0}
-sweeps:
-  - theta_i_deg: [30, 45.0, 60.0]
-    dphi_deg: [0.0]
-    theta_r_deg: {start: -80.0, stop: 80.0, num: 33}
-window: {width_mm: 20.0, height_mm: 20.0}
-frames_per_point: 4
-exposure_target: 0.7
-references:
-  white_tile: {reflectance: 0.99, u_reflectance: 0.005, theta_r_deg: 10.0}
-  drift_check: {theta_r_deg: 10.0, every_points: 25}
-fit:
-  models: [lambert, oren_nayar]
-simulated_sample:
-  model: oren_nayar
-  parameters: {albedo: 0.8, sigma_deg: 20}
-"""
-
-
-def check_model(name: str, parameters: dict[str, float] | None) -> str | None:
-    if name not in ("lambert", "oren_nayar"):
-        return f"{name!r} is no model; allowed: lambert, oren_nayar"
-    wrong = set(parameters or {}) - {"albedo", "sigma_deg"}
-    return f"{name} has no parameter {wrong.pop()}" if wrong else None
-
-
-@pytest.fixture(autouse=True)
-def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
-def load(protocol: str = PROTOCOL, rig: str = RIG) -> Loaded:
-    Path("protocol.yaml").write_text(protocol)
-    Path("rig.yaml").write_text(rig)
-    return load_protocol(Path("protocol.yaml"), check_model=check_model)
-
-
-def problems(protocol: str = PROTOCOL, rig: str = RIG) -> tuple[str, ...]:
-    with pytest.raises(InputError) as caught:
-        load(protocol, rig)
-    return caught.value.problems
-
-
-def changed(text: str, old: str, new: str) -> str:
-    assert text.count(old) == 1, f"{old!r} stands {text.count(old)} times"
-    return text.replace(old, new)
+from tests.support.config.mistakes import PROTOCOL_MISTAKES, RIG_MISTAKES
+from tests.support.config.texts import PROTOCOL, RIG, changed, load, problems
 
 
 def test_sound_files_load_with_their_texts() -> None:
@@ -193,15 +107,6 @@ def message_of(path: Path, rig: Path | None = None) -> str:
     return str(caught.value)
 
 
-def test_a_missing_file_names_similar_ones() -> None:
-    load()
-    assert message_of(Path("protcol.yaml")) == (
-        "protcol.yaml: no such file; in . there is protocol.yaml"
-    )
-    assert message_of(Path("x.yaml")).endswith("in . there is protocol.yaml, rig.yaml")
-    assert "there is no folder none" in message_of(Path("none/x.yaml"))
-
-
 def test_a_missing_rig_does_not_hide_the_protocols_mistakes() -> None:
     Path("protocol.yaml").write_text(changed(PROTOCOL, "0.7", "7"))
     first, second = message_of(Path("protocol.yaml"), Path("gone.yaml")).splitlines()
@@ -209,23 +114,22 @@ def test_a_missing_rig_does_not_hide_the_protocols_mistakes() -> None:
     assert second.startswith("gone.yaml: no such file")
 
 
-def test_a_folder_is_no_file() -> None:
-    Path("configs").mkdir()
-    Path("configs/a.yaml").write_text("")
-    assert message_of(Path("configs")) == (
-        "configs: is a folder; allowed: a YAML file; in configs there is a.yaml"
-    )
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may read every file")
-def test_a_file_that_may_not_be_read() -> None:
-    Path("secret.yaml").write_text("a: 1")
-    Path("secret.yaml").chmod(0)
-    assert message_of(Path("secret.yaml")).startswith("secret.yaml: cannot be read: Permission")
-
-
-def test_a_name_with_control_characters_is_shown_harmless() -> None:
-    assert "\x1b" not in message_of(Path("a\x1b[2J.yaml"))
+def test_many_mistakes_at_once_in_order_of_file_and_line() -> None:
+    protocol, rig = PROTOCOL, RIG
+    lines = []
+    for kind in ("empty text", "too small", "incidence past the axis", "num 0", "octal"):
+        old, new, message = PROTOCOL_MISTAKES[kind]
+        protocol = changed(protocol, old, new)
+        lines.append(f"protocol.yaml:{message}")
+    for kind in ("too large", "drift check past the axis", "unknown model", "not finite"):
+        old, new, message = PROTOCOL_MISTAKES[kind]
+        protocol = changed(protocol, old, new)
+        lines.append(f"protocol.yaml:{message}")
+    for kind in ("limits swapped", "range of one", "exposures swapped"):
+        old, new, message = RIG_MISTAKES[kind]
+        rig = changed(rig, old, new)
+        lines.append(f"rig.yaml:{message}")
+    assert list(problems(protocol, rig)) == lines
 
 
 def test_empty_and_odd_files() -> None:

@@ -131,9 +131,9 @@ def test_keys_are_always_text() -> None:
 def test_every_double_key_is_told_and_the_first_kept() -> None:
     text = "a: 1\nb: 2\na: 3\nc: {d: 1, d: 2}\na: 4\n"
     assert mistakes(text) == [
-        (3, 1, "the key stands twice, first at line 1, column 1; keep one of them"),
-        (4, 11, "the key stands twice, first at line 4, column 5; keep one of them"),
-        (5, 1, "the key stands twice, first at line 1, column 1; keep one of them"),
+        (3, 1, "duplicate key, first at line 1, column 1; keep one of them"),
+        (4, 11, "duplicate key, first at line 4, column 5; keep one of them"),
+        (5, 1, "duplicate key, first at line 1, column 1; keep one of them"),
     ]
     assert read(text).data == {"a": 1, "b": 2, "c": {"d": 1}}
 

@@ -1,0 +1,53 @@
+"""Files are written whole or not at all, and read only where they are files."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from instrument.errors import StorageError
+from instrument.text.atomic_file import read_file, write_whole
+
+
+def test_a_file_is_written_whole_or_its_old_self_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "fit.json"
+    write_whole(path, "old")
+
+    def full(number: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(StorageError, match=r"fit\.json: the disk is full .*make room"):
+        write_whole(path, "new")
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["fit.json"]
+
+
+def test_no_link_leads_what_is_written_elsewhere(tmp_path: Path) -> None:
+    """Neither under the file's own name nor under the temporary one."""
+    victim = tmp_path / "mine.txt"
+    victim.write_text("mine")
+    for name in ("fit.json", f".fit.json.{os.getpid()}.part"):
+        (tmp_path / name).symlink_to(victim)
+    write_whole(tmp_path / "fit.json", "new")
+    assert victim.read_text() == "mine"
+    assert (tmp_path / "fit.json").read_text() == "new"
+    assert not (tmp_path / "fit.json").is_symlink()
+
+
+def test_a_file_is_read_to_one_byte_past_the_limit(tmp_path: Path) -> None:
+    """So that the reader can see that there is more."""
+    (tmp_path / "a").write_bytes(b"12345")
+    assert read_file(tmp_path / "a", 3) == b"1234"
+    assert read_file(tmp_path / "a", 9) == b"12345"
+
+
+def test_a_pipe_is_refused_unless_it_is_allowed(tmp_path: Path) -> None:
+    """Reading it would wait for ever."""
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OSError, match="it is a device, a pipe or a socket, not a file"):
+        read_file(tmp_path / "pipe", 10)
