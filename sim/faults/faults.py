@@ -11,43 +11,32 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping
-from typing import TypeVar, cast
+from collections.abc import Mapping
+from typing import TypeVar
 
 from instrument.config.axes import AXES, SimulatedAxis
 from instrument.devices import Camera, Lamp, Operator, Stage
 from instrument.errors import InputError
-from sim.faults.faulty_devices import FaultyCamera, FaultyLamp, FaultyOperator, FaultyStage
-from sim.faults.triggers import Action, Triggers, When
+from sim.faults.faulty_devices import (
+    FaultyCamera,
+    FaultyDevice,
+    FaultyLamp,
+    FaultyOperator,
+    FaultyStage,
+)
+from sim.faults.triggers import Triggers, When
 from sim.scene.scene import Scene
 
 VARIABLE = "GONIO_FAULTS"
-STAGE: Mapping[str, Callable[[FaultyStage], None]] = {
-    "does not answer": FaultyStage.fall_silent,
-    "stalls": FaultyStage.stall,
-    "stops short": FaultyStage.stop_short,
-    "slips": FaultyStage.slip,
-    "loses its reference": FaultyStage.lose_reference,
-    "meets its limit switch": FaultyStage.meet_switch,
+FAULTS: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(AXES, FaultyStage.faults),
+    "camera": FaultyCamera.faults,
+    "lamp": FaultyLamp.faults,
+    "operator": FaultyOperator.faults,
 }
-CAMERA: Mapping[str, Callable[[FaultyCamera], None]] = {
-    "gives no frame": FaultyCamera.freeze,
-    "gives a torn frame": FaultyCamera.tear,
-    "gives torn frames": FaultyCamera.tear_all,
-    "is unplugged": FaultyCamera.unplug,
-    "comes back": FaultyCamera.replug,
-}
-LAMP: Mapping[str, Callable[[FaultyLamp], None]] = {"sticks": FaultyLamp.stick}
-OPERATOR: Mapping[str, Callable[[FaultyOperator], None]] = {
-    "refuses": FaultyOperator.refuse,
-    "leaves": FaultyOperator.leave,
-}
-_BY_DEVICE: Mapping[str, Mapping[str, object]] = {
-    **dict.fromkeys(AXES, STAGE), "camera": CAMERA, "lamp": LAMP, "operator": OPERATOR,
-}  # fmt: skip
 _FAULT = re.compile(r"(\w+) (.+) (at|after) (\w+\.\w+) ([1-9]\d*)")
 
-D = TypeVar("D")
+D = TypeVar("D", bound=FaultyDevice)
 
 
 class Faults:
@@ -59,7 +48,7 @@ class Faults:
     def __init__(self, text: str = "") -> None:
         self.triggers = Triggers()
         self.scene: Scene | None = None
-        self._devices: dict[str, object] = {}
+        self._devices: dict[str, FaultyDevice] = {}
         for part in filter(None, map(str.strip, text.split(";"))):
             self._plan_text(part)
 
@@ -70,8 +59,13 @@ class Faults:
         return cls(text) if text else None
 
     def plan(self, device: str, fault: str, when: When, call: str, number: int) -> None:
-        """Plan a fault from the tables above for a device, at or after a call."""
-        self.triggers.plan(when, call, number, self._action(device, fault))
+        """Plan a fault listed in `FAULTS`, at or after a call."""
+
+        def make_fail() -> None:
+            if device in self._devices:
+                self._devices[device].fail(fault)
+
+        self.triggers.plan(when, call, number, make_fail)
 
     def stage(self, name: str, stage: Stage, axis: SimulatedAxis, scene: Scene) -> Stage:
         """Wrap the stage of axis `name`."""
@@ -94,20 +88,10 @@ class Faults:
         self._devices[name] = device
         return device
 
-    def _action(self, device: str, fault: str) -> Action:
-        make_fail = cast("Callable[[object], None]", _BY_DEVICE[device][fault])
-
-        def action() -> None:
-            if device in self._devices:
-                make_fail(self._devices[device])
-
-        return action
-
     def _plan_text(self, text: str) -> None:
         found = _FAULT.fullmatch(text)
-        faults = _BY_DEVICE.get(found[1], {}) if found else {}
-        if found is None or found[2] not in faults:
-            allowed = "; ".join(f"{name}: {', '.join(words)}" for name, words in _BY_DEVICE.items())
+        if found is None or found[2] not in FAULTS.get(found[1], ()):
+            allowed = "; ".join(f"{name}: {', '.join(words)}" for name, words in FAULTS.items())
             raise InputError(
                 f"{VARIABLE}: {text!r}; allowed: DEVICE FAULT at|after DEVICE.CALL NUMBER, as in "
                 f"'theta_r stalls at theta_r.wait 5', with {allowed}"

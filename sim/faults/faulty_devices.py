@@ -1,14 +1,17 @@
 """Wrappers that make simulated devices fail on request; until then they forward every call.
 
-The messages follow those of the real drivers. A fault also changes the scene, so that a fault
-which the program overlooked would show as a wrong measured value.
+A fault is named by its words in `GONIO_FAULTS`. The messages follow those of the real drivers.
+What fails also shows in the scene, so that a fault which the program overlooked would give a wrong
+measured value.
 """
 
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from typing import ClassVar
 
 from instrument.config.axes import SimulatedAxis
 from instrument.devices import Camera, Frame, Lamp, Operator, Request, Stage
@@ -23,45 +26,48 @@ _MOST_TORN = 3  # consecutive bad frames tolerated, as by the V4L2 driver
 _CABLE = "check the USB cable, the camera and any hub in between"
 
 
-class FaultyStage:
+class FaultyDevice:
+    """Base class: the faults that a device can have, and those it has now."""
+
+    faults: ClassVar[tuple[str, ...]]
+
+    def __init__(self, name: str, triggers: Triggers) -> None:
+        self._name, self._triggers = name, triggers
+        self._active: Counter[str] = Counter()
+
+    def fail(self, fault: str) -> None:
+        """Begin a fault, one of `faults`."""
+        self._active[fault] += 1
+
+    def _call(self, method: str) -> AbstractContextManager[None]:
+        """Context of one call: counts it, runs planned faults, and checks that it can succeed."""
+        return self._triggers.call(f"{self._name}.{method}", self._check)
+
+    def _check(self) -> None:
+        """Raise if the device cannot answer at all."""
+
+
+class FaultyStage(FaultyDevice):
     """Stage of one motorised axis."""
+
+    faults = (
+        "does not answer", "stalls", "stops short", "slips", "loses its reference",
+        "meets its limit switch",
+    )  # fmt: skip
 
     def __init__(
         self, name: str, stage: Stage, axis: SimulatedAxis, scene: Scene, triggers: Triggers
     ) -> None:
-        self._name, self._stage, self._axis = name, stage, axis
-        self._scene, self._triggers = scene, triggers
-        self._silent = self._blocked = self._unreferenced = self._at_limit_switch = False
-        self._short_deg = self._offset_deg = 0.0
+        super().__init__(name, triggers)
+        self._stage, self._axis, self._scene = stage, axis, scene
+        self._offset_deg = 0.0
 
-    # Faults
-
-    def fall_silent(self) -> None:
-        """Stop answering."""
-        self._silent = True
-
-    def stall(self) -> None:
-        """Block the axis at its position."""
-        self._blocked = True
-
-    def stop_short(self) -> None:
-        """End the next move before its target, unnoticed by the controller."""
-        self._short_deg = _OFFSET_DEG
-
-    def slip(self) -> None:
-        """Push the axis away from its position, without a command."""
-        self._offset_deg = _OFFSET_DEG
-        self._write_scene()
-
-    def lose_reference(self) -> None:
-        """Lose the reference, as after a power failure of the controller."""
-        self._unreferenced = True
-
-    def meet_switch(self) -> None:
-        """Run onto the limit switch."""
-        self._at_limit_switch = True
-
-    # Stage interface
+    def fail(self, fault: str) -> None:
+        """Begin a fault; a stage that slips moves at once."""
+        super().fail(fault)
+        if fault == "slips":
+            self._offset_deg = _OFFSET_DEG
+            self._write_scene()
 
     def identity(self) -> str:
         """Return the wrapped stage's description."""
@@ -73,12 +79,13 @@ class FaultyStage:
         with self._call("home"):
             self._require_free("its reference was not found")
             self._stage.home()
-            self._unreferenced, self._offset_deg = False, 0.0
+            self._active.pop("loses its reference", None)
+            self._offset_deg = 0.0
 
     def homed(self) -> bool:
         """Return True if the reference is known."""
         with self._call("homed"):
-            return not self._unreferenced and self._stage.homed()
+            return "loses its reference" not in self._active and self._stage.homed()
 
     def settings(self) -> dict[str, str]:
         """Return the wrapped stage's settings."""
@@ -97,7 +104,7 @@ class FaultyStage:
             self._require_free("stalled")
             self._require_reference()
             reached_deg = self._stage.wait()
-            self._offset_deg, self._short_deg = -self._short_deg, 0.0
+            self._offset_deg = -_OFFSET_DEG if self._active.pop("stops short", 0) else 0.0
             self._write_scene()
             return reached_deg + self._offset_deg
 
@@ -121,20 +128,17 @@ class FaultyStage:
     def close(self) -> None:
         """Do nothing: there is nothing to release."""
 
-    def _call(self, name: str) -> AbstractContextManager[None]:
-        return self._triggers.call(f"{self._name}.{name}", self._require_answer)
-
-    def _require_answer(self) -> None:
-        if self._silent:
+    def _check(self) -> None:
+        if "does not answer" in self._active:
             raise DeviceError(f"{self._name}: no answer within 0.15 s: check its power and cable")
 
     def _require_free(self, failure: str) -> None:
         """Stop and raise if the axis is blocked or at its limit switch."""
-        if not (self._blocked or self._at_limit_switch):
+        if not self._active.keys() & {"stalls", "meets its limit switch"}:
             return
         self._stage.stop()
         at_deg = self._stage.position_deg()
-        if self._at_limit_switch:
+        if "meets its limit switch" in self._active:
             raise DeviceError(
                 f"{self._name}: limit switch met at {at_deg:g} deg: find out why the stage ran "
                 "onto it, move it clear by hand, then home it"
@@ -145,7 +149,7 @@ class FaultyStage:
         )
 
     def _require_reference(self) -> None:
-        if self._unreferenced:
+        if "loses its reference" in self._active:
             raise DeviceError(
                 f"{self._name}: reference lost: check the controller's power supply, then home it"
             )
@@ -156,37 +160,23 @@ class FaultyStage:
             self._scene.set_axis(self._name, self._axis.from_device_deg(device_deg))
 
 
-class FaultyCamera:
+class FaultyCamera(FaultyDevice):
     """Camera on a cable; reopening it and retaking torn frames take no simulated time."""
 
+    faults = (
+        "gives no frame", "gives a torn frame", "gives torn frames", "is unplugged", "comes back",
+    )  # fmt: skip
+
     def __init__(self, camera: Camera, triggers: Triggers) -> None:
-        self._camera, self._triggers = camera, triggers
-        self._unplugged = self._frozen = False
-        self._torn = 0
+        super().__init__("camera", triggers)
+        self._camera = camera
 
-    # Faults
-
-    def unplug(self) -> None:
-        """Disconnect the camera."""
-        self._unplugged = True
-
-    def replug(self) -> None:
-        """Connect the camera again."""
-        self._unplugged = False
-
-    def freeze(self) -> None:
-        """Deliver no frame until the camera is reopened."""
-        self._frozen = True
-
-    def tear(self) -> None:
-        """Tear the next frame."""
-        self._torn += 1
-
-    def tear_all(self) -> None:
-        """Tear all frames from now on."""
-        self._torn = 10**6
-
-    # Camera interface
+    def fail(self, fault: str) -> None:
+        """Begin a fault; "comes back" ends an unplugging."""
+        if fault == "comes back":
+            self._active.pop("is unplugged", None)
+        else:
+            super().fail(fault)
 
     def identity(self) -> str:
         """Return the wrapped camera's description."""
@@ -206,63 +196,59 @@ class FaultyCamera:
     def grab(self, count: int) -> list[Frame]:
         """Take `count` frames, retaking torn ones."""
         with self._call("grab"):
-            self._require_stream()
+            if self._active.pop("gives no frame", 0):  # the next attempt reopens the camera
+                raise CameraLost(f"camera: no frame for 1 s: the stream has stopped; {_CABLE}")
             self._discard_torn()
             return self._camera.grab(count)
 
     def close(self) -> None:
         """Do nothing: there is nothing to release."""
 
-    def _call(self, name: str) -> AbstractContextManager[None]:
-        return self._triggers.call(f"camera.{name}", self._require_plugged)
-
-    def _require_plugged(self) -> None:
-        if self._unplugged:
+    def _check(self) -> None:
+        if "is unplugged" in self._active:
             raise CameraLost(f"camera: not found: unplugged or without power; {_CABLE}")
 
-    def _require_stream(self) -> None:
-        """Raise once if the stream is frozen: the next attempt reopens the camera."""
-        if self._frozen:
-            self._frozen = False
-            raise CameraLost(f"camera: no frame for 1 s: the stream has stopped; {_CABLE}")
-
     def _discard_torn(self) -> None:
-        discarded = 0
-        while self._torn:
-            self._torn, discarded = self._torn - 1, discarded + 1
-            if discarded > _MOST_TORN:
-                raise DeviceError(f"camera: {discarded} bad frames in a row, all torn; {_CABLE}")
+        for _ in range(_MOST_TORN):
+            if not self._next_is_torn():
+                return
             log.warning("camera: a torn frame: retaken")
+        if self._next_is_torn():
+            raise DeviceError(f"camera: {_MOST_TORN + 1} bad frames in a row, all torn; {_CABLE}")
+
+    def _next_is_torn(self) -> bool:
+        if self._active["gives a torn frame"]:
+            self._active["gives a torn frame"] -= 1
+            return True
+        return "gives torn frames" in self._active
 
 
-class FaultyLamp:
+class FaultyLamp(FaultyDevice):
     """Lamp with a shutter."""
 
-    def __init__(self, lamp: Lamp, triggers: Triggers) -> None:
-        self._lamp, self._triggers = lamp, triggers
-        self._stuck = False
+    faults = ("sticks",)
 
-    def stick(self) -> None:
-        """Block the shutter; the next command reports it."""
-        self._stuck = True
+    def __init__(self, lamp: Lamp, triggers: Triggers) -> None:
+        super().__init__("lamp", triggers)
+        self._lamp = lamp
 
     def identity(self) -> str:
         """Return the wrapped lamp's description."""
-        with self._triggers.call("lamp.identity"):
+        with self._call("identity"):
             return self._lamp.identity()
 
     def darken(self) -> None:
         """Close the shutter."""
-        with self._triggers.call("lamp.darken"):
+        with self._call("darken"):
             self._move(self._lamp.darken, "close")
 
     def light(self) -> None:
         """Open the shutter."""
-        with self._triggers.call("lamp.light"):
+        with self._call("light"):
             self._move(self._lamp.light, "open")
 
     def _move(self, action: Callable[[], None], verb: str) -> None:
-        if self._stuck:
+        if "sticks" in self._active:
             raise DeviceError(
                 f"lamp: its shutter does not {verb}: check its cable and power supply, and cover "
                 "the lamp by hand if it is on"
@@ -270,26 +256,20 @@ class FaultyLamp:
         action()
 
 
-class FaultyOperator:
-    """Operator who can refuse a request or leave."""
+class FaultyOperator(FaultyDevice):
+    """Operator who can refuse a request (answer q) or leave (close the terminal)."""
+
+    faults = ("refuses", "leaves")
 
     def __init__(self, operator: Operator, triggers: Triggers) -> None:
-        self._operator, self._triggers = operator, triggers
-        self._refuses = self._absent = False
-
-    def refuse(self) -> None:
-        """Answer q to every request."""
-        self._refuses = True
-
-    def leave(self) -> None:
-        """Close the terminal."""
-        self._absent = True
+        super().__init__("operator", triggers)
+        self._operator = operator
 
     def ask(self, request: Request) -> str:
         """Return the operator's answer; raise `OperatorStop` if there is none."""
-        with self._triggers.call("operator.ask"):
-            if self._refuses:
+        with self._call("ask"):
+            if "refuses" in self._active:
                 raise OperatorStop(f"stopped at the prompt: {request.text}")
-            if self._absent:
+            if "leaves" in self._active:
                 raise OperatorStop("standard input ended: nobody answers")
             return self._operator.ask(request)
