@@ -7,22 +7,20 @@ real time.
 from __future__ import annotations
 
 import atexit
-import copy
 import os
 import shutil
 import sys
 import tempfile
 import threading
-from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import assert_never
 
 from instrument.clock import Clock
 from instrument.config.axes import NewportAxis, OrientalAxis, Wired, ZaberAxis
 from instrument.config.camera import V4l2CameraConfig
-from instrument.devices import Image, Surface
+from instrument.devices import Image
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.newport_controller import NewportController
 from sim.emulated.oriental_controller import OrientalController
@@ -60,17 +58,6 @@ def restart_with_camera() -> None:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _SceneSnapshot:
-    """State of the scene at the start of an exposure."""
-
-    surface: Surface
-    lit: bool
-    step: int
-    planned_s: float
-    true_deg: Mapping[str, float]
-
-
 class EmulatedBench:
     """Emulated devices over one scene; each is connected just before its driver opens it."""
 
@@ -101,27 +88,25 @@ class EmulatedBench:
 
     def plug_camera(self, camera: V4l2CameraConfig) -> str:
         """Connect the camera; return the device path for its driver."""
-        rendered = copy.copy(self._scene)  # separate state, shared caches
-        sensor, lock = Sensor(rendered), threading.Lock()
+        self._scene.mottling()  # computed once, shared by all snapshots
+        sensor, lock = Sensor(self._scene), threading.Lock()
 
         def render(exposure: Exposure, snapshot: object) -> Image:
             with lock:
-                if isinstance(snapshot, _SceneSnapshot):
-                    rendered.surface, rendered.lit = snapshot.surface, snapshot.lit
-                    rendered.begin_step(snapshot.step, snapshot.planned_s)
-                    rendered.true_deg = dict(snapshot.true_deg)
+                if isinstance(snapshot, Scene):
+                    sensor.scene = snapshot
                 return sensor.picture(exposure.exposure_s)
 
         device = EmulatedCamera(render, self._snapshot, _capabilities(camera))
         self._closing.enter_context(V4l2Server(device, Path(os.environ[_SOCKET])))
         return CAMERA_DEVICE
 
-    def _snapshot(self) -> _SceneSnapshot:
+    def _snapshot(self) -> Scene:
+        """Copy of the scene at the start of an exposure, with the motors' present angles."""
         scene = self._scene
         for name, motor in self._motors.items():
             scene.set_axis(name, scene.rig.axes[name].from_device_deg(motor.position_deg))
-        state = (scene.surface, scene.lit, scene.step, scene.planned_s)
-        return _SceneSnapshot(*state, dict(scene.true_deg))
+        return replace(scene, true_deg=dict(scene.true_deg))
 
 
 def _controller(axis: Wired, motor: Motor) -> Controller:

@@ -142,10 +142,8 @@ class PtyWire(_Wire):
                 return  # unplugged
 
     def _send(self, data: bytes) -> None:
-        try:
+        with contextlib.suppress(OSError):  # unplugged meanwhile
             os.write(self._master, data)
-        except OSError:
-            return  # unplugged meanwhile
 
     def _unplug(self) -> None:
         with self._descriptors:
@@ -178,10 +176,8 @@ class TcpWire(_Wire):
 
     def _send(self, data: bytes) -> None:
         if self._peer is not None:
-            try:
+            with contextlib.suppress(OSError):  # the master has disconnected
                 self._peer.sendall(data)
-            except OSError:
-                return  # the master has disconnected
 
     def _unplug(self) -> None:
         for end in (self._peer, self._listener):

@@ -14,7 +14,7 @@ _SceneState = tuple[object, ...]  # surface and true angles: all that a rendered
 
 
 class Sensor:
-    """Sensor that looks at one scene.
+    """Sensor that looks at `scene`.
 
     The noise belongs to a frame, not to a call. It is keyed by the plan's step (for a dark frame
     only by its being dark), the exposure, and the frame's number since either last changed, so
@@ -26,7 +26,7 @@ class Sensor:
 
     def __init__(self, scene: Scene) -> None:
         cv2.setNumThreads(1)  # images are so small that several threads are slower than one
-        self._scene = scene
+        self.scene = scene
         self._settings: CameraConfig = scene.rig.camera
         self._series: tuple[int, ...] = ()
         self._frame_number = 0
@@ -52,7 +52,7 @@ class Sensor:
 
     def _mean_and_spread_dn(self, exposure_s: float) -> tuple[FloatImage, FloatImage]:
         """Expected counts of each pixel and their standard deviation, before rounding."""
-        scene = self._scene
+        scene = self.scene
         level = round(scene.lamp_level(), 6) if scene.lit else 0.0
         state = (scene.surface, *sorted(scene.true_deg.items()))
         key = (state, exposure_s, level)
@@ -65,7 +65,7 @@ class Sensor:
     def _light_of(self, state: _SceneState) -> FloatImage:
         """Electrons per second at lamp level 1."""
         if state != self._light_state:
-            self._light, self._light_state = electrons_per_s(self._scene), state
+            self._light, self._light_state = electrons_per_s(self.scene), state
         return self._light
 
     def _expected_dn(
@@ -84,7 +84,7 @@ class Sensor:
 
     def _standard_normal(self, exposure_s: float) -> FloatImage:
         """Standard normal noise; OpenCV's generator is four times as fast here as NumPy's."""
-        scene = self._scene
+        scene = self.scene
         step_key = (stream_key("frame"), scene.step) if scene.lit else (stream_key("dark"),)
         series = (scene.rig.simulation.seed, *step_key, round(exposure_s * 1e9))
         self._frame_number = self._frame_number + 1 if series == self._series else 0

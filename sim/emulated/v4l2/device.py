@@ -171,10 +171,8 @@ class EmulatedCamera:
 
     # Controls
 
-    def controls(self, *, current: bool = True) -> Mapping[int, ioctl.Control]:
-        """Return the controls by number, with their current or default values."""
-        if not current:
-            return self._controls
+    def controls(self) -> Mapping[int, ioctl.Control]:
+        """Return the controls by number, with their present values."""
         return {n: replace(c, value=self._values[n]) for n, c in self._controls.items()}
 
     def value(self, number: int) -> int:

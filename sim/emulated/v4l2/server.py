@@ -85,10 +85,10 @@ class _Descriptor:
             ioctl.ENUM_FRAMESIZES: ("ENUM_FRAMESIZES", self._list_size),
             ioctl.G_FMT: ("G_FMT", self._format),
             ioctl.S_FMT: ("S_FMT", self._set_format),
-            ioctl.TRY_FMT: ("TRY_FMT", self._try_format),
+            ioctl.TRY_FMT: ("TRY_FMT", lambda a: _pack_format(self._nearest_format(a))),
             ioctl.REQBUFS: ("REQBUFS", self._request_buffers),
-            ioctl.QUERYBUF: ("QUERYBUF", self._query_buffer),
-            ioctl.QBUF: ("QBUF", self._queue),
+            ioctl.QUERYBUF: ("QUERYBUF", lambda a: self._stream.query(_buffer_index(a))),
+            ioctl.QBUF: ("QBUF", lambda a: self._stream.queue(_buffer_index(a))),
             ioctl.DQBUF: ("DQBUF", lambda _: self._stream.dequeue()),
             ioctl.STREAMON: ("STREAMON", self._start),
             ioctl.STREAMOFF: ("STREAMOFF", self._stop),
@@ -146,9 +146,6 @@ class _Descriptor:
         _require(argument[:4] == ioctl.CAPTURE.to_bytes(4, "little"))
         return _pack_format(self._camera.format())
 
-    def _try_format(self, argument: bytes) -> bytes:
-        return _pack_format(self._nearest_format(argument))
-
     def _set_format(self, argument: bytes) -> bytes:
         chosen = self._nearest_format(argument)
         _require(self._camera.streamer is None, errno.EBUSY)
@@ -165,12 +162,6 @@ class _Descriptor:
         _require(kind == ioctl.CAPTURE and memory == ioctl.MMAP)
         granted = self._stream.request_buffers(count)
         return ioctl.REQBUFS_STRUCT.pack(granted, kind, memory, 1)
-
-    def _query_buffer(self, argument: bytes) -> bytes:
-        return self._stream.query(_buffer_index(argument))
-
-    def _queue(self, argument: bytes) -> bytes:
-        return self._stream.queue(_buffer_index(argument))
 
     def _start(self, argument: bytes) -> bytes:
         self._stream.start()
@@ -195,7 +186,7 @@ class _Descriptor:
 
     def _query_control(self, argument: bytes) -> bytes:
         number = ioctl.QUERYCTRL_STRUCT.unpack(argument)[0]
-        controls = self._camera.controls(current=False)
+        controls = self._camera.controls()
         if number & _NEXT:
             number = min((n for n in controls if n > number & ~_NEXT), default=0)
         _require(number in controls)

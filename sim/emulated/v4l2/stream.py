@@ -97,19 +97,18 @@ class Stream:
     def query(self, index: int) -> bytes:
         """Return the state of a buffer as bytes of `struct v4l2_buffer`."""
         with self._change:
-            if not self._camera.capabilities.reports_filled:
-                return self._pack_as(index, _Buffer())
-            return self._pack(index)
+            buffer = self._buffer(index)
+            visible = self._camera.capabilities.reports_filled
+            return self._pack(index, buffer if visible else _Buffer())
 
     def queue(self, index: int) -> bytes:
         """Take an empty buffer back from the application; return its state."""
         with self._change:
-            buffer = self._buffer(index)
-            if buffer.state:
+            if self._buffer(index).state:
                 raise Refused(errno.EINVAL)
-            self._buffers[index] = _Buffer(state=ioctl.BUFFER_QUEUED)
+            buffer = self._buffers[index] = _Buffer(state=ioctl.BUFFER_QUEUED)
             self._queued.append(index)
-            return self._pack(index)
+            return self._pack(index, buffer)
 
     def dequeue(self) -> bytes:
         """Render the oldest filled buffer, hand it to the application and return its state."""
@@ -120,8 +119,8 @@ class Stream:
                 raise Refused(errno.EAGAIN)
             index = self._done.popleft()
             os.eventfd_read(self.ready)
-            answer = self._pack(index)
             buffer = self._buffers[index]
+            answer = self._pack(index, buffer)
             buffer.state = 0
         self._render(index, buffer)
         return answer
@@ -159,11 +158,7 @@ class Stream:
             raise Refused(errno.EINVAL)
         return self._buffers[index]
 
-    def _pack(self, index: int) -> bytes:
-        return self._pack_as(index, self._buffer(index))
-
-    def _pack_as(self, index: int, buffer: _Buffer) -> bytes:
-        self._buffer(index)
+    def _pack(self, index: int, buffer: _Buffer) -> bytes:
         flags = _MONOTONIC | buffer.state
         if buffer.state == ioctl.BUFFER_DONE and buffer.bad:
             flags |= ioctl.BUFFER_ERROR
