@@ -12,15 +12,12 @@ class Clock(Protocol):
 
     def now_s(self) -> float:
         """Return monotonic time in seconds from an arbitrary start."""
-        ...
 
     def utc(self) -> datetime:
         """Return the date and time in UTC."""
-        ...
 
     def sleep(self, seconds: float) -> None:
         """Wait for `seconds`."""
-        ...
 
 
 class SystemClock:

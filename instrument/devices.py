@@ -45,7 +45,6 @@ class Operator(Protocol):
 
     def ask(self, request: Request) -> str:
         """Return the answer once the request is done; raise `OperatorStop` if it is refused."""
-        ...
 
 
 class Stage(Protocol):
@@ -53,43 +52,33 @@ class Stage(Protocol):
 
     def identity(self) -> str:
         """Return maker, model and serial number as the device gives them."""
-        ...
 
     def home(self) -> None:
         """Search for the reference; no other motion is allowed before."""
-        ...
 
     def homed(self) -> bool:
         """Return True if the axis, at rest, knows its reference; always so if set by hand."""
-        ...
 
     def settings(self) -> dict[str, str]:
         """Return settings by name, read back from the device if possible; units in the names."""
-        ...
 
     def start_move(self, angle_deg: float) -> None:
         """Start a move to `angle_deg` and return at once."""
-        ...
 
     def wait(self) -> float:
         """Wait for the end of the move and return the position in degrees."""
-        ...
 
     def position_deg(self) -> float:
         """Return the position in degrees, also during a move."""
-        ...
 
     def limits_deg(self) -> tuple[float, float]:
         """Return the smallest and the largest angle in degrees that the axis accepts."""
-        ...
 
     def stop(self) -> None:
         """Stop all motion now; may be called at any time, twice, and from another thread."""
-        ...
 
     def close(self) -> None:
         """Release the device; may be called twice."""
-        ...
 
 
 class Camera(Protocol):
@@ -97,23 +86,18 @@ class Camera(Protocol):
 
     def identity(self) -> str:
         """Return maker, model and serial number as the device gives them."""
-        ...
 
     def settings(self) -> dict[str, str]:
         """Return settings by name, read back from the device if possible; units in the names."""
-        ...
 
     def set_exposure_s(self, exposure_s: float) -> float:
         """Set the exposure and return the value read back, in seconds."""
-        ...
 
     def grab(self, count: int) -> list[Frame]:
         """Return `count` frames whose exposure began after this call."""
-        ...
 
     def close(self) -> None:
         """Release the device; may be called twice."""
-        ...
 
 
 class Lamp(Protocol):
@@ -121,12 +105,9 @@ class Lamp(Protocol):
 
     def identity(self) -> str:
         """Return what darkens the lamp: the device's identity, or the operator."""
-        ...
 
     def darken(self) -> None:
         """Block all light on the sample."""
-        ...
 
     def light(self) -> None:
         """Let full light onto the sample."""
-        ...

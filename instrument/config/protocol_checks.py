@@ -1,0 +1,201 @@
+"""Checks of a protocol across its values and against its rig, in files that may hold mistakes.
+
+Values that are valid by themselves are checked even if others in the files are not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from itertools import product
+from typing import Any
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from instrument.config.axes import AXES, EMULATED, Axis
+from instrument.config.protocol import Angles, Degrees, DriftCheck, Steps, WhiteTile, angles_deg
+from instrument.config.section import Finite, Name, Positive
+from instrument.config.yaml_positions import KeyPath, MarkedYaml
+
+MAX_GEOMETRIES = 1_000_000  # at one a second, eleven days
+
+ModelCheck = Callable[[str, dict[str, float] | None], str | None]
+Mistakes = Iterator[tuple[KeyPath, str]]
+
+_MODELS: KeyPath = ("fit", "models")
+_GEOMETRY_DEG = {"theta_i": (0.0, 89.5), "theta_r": (-89.5, 89.5)}
+_DEGREES: TypeAdapter[Any] = TypeAdapter(Degrees)
+_ANGLES: TypeAdapter[Any] = TypeAdapter(Angles)
+_AXIS: TypeAdapter[Any] = TypeAdapter(Axis)
+_POSITIVE: TypeAdapter[Any] = TypeAdapter(Positive)
+_NAME: TypeAdapter[Any] = TypeAdapter(Name)
+_PARAMETERS: TypeAdapter[Any] = TypeAdapter(dict[str, Finite])
+
+
+def rig_mistakes(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -> Mistakes:
+    """Yield what the rig cannot do of the protocol: path in the protocol, and message."""
+    for axis in AXES:
+        limits = _sound(_AXIS, rig, "axes", axis)
+        if limits is None:
+            continue
+        place = f"{rig_name}:{rig.mark(('axes', axis)).line}"
+        for path, value in _written_angles(protocol, axis):
+            if not limits.min_deg <= value <= limits.max_deg and not _impossible(axis, value):
+                yield (
+                    path,
+                    f"{value:g} deg is past the limits of axis {axis}; allowed: "
+                    f"{limits.min_deg:g} to {limits.max_deg:g} deg ({place})",
+                )
+    yield from _window_past_picture(protocol, rig, rig_name)
+    scene = rig.get(("camera", "driver")) == "simulated" or (
+        rig.get(("camera", "device")) == EMULATED
+    )
+    if scene and protocol.get(("simulated_sample",)) is None:
+        text = f"is missing; the rig {rig_name} is simulated and needs a sample to render"
+        yield ("simulated_sample",), text
+
+
+def own_mistakes(protocol: MarkedYaml, check_model: ModelCheck | None) -> Mistakes:
+    """Yield the values of a protocol that contradict one another: path and message.
+
+    `check_model(name, parameters or None)` returns what is wrong with a model, or None.
+    """
+    for axis, (low, high) in _GEOMETRY_DEG.items():
+        for path, value in _written_angles(protocol, axis):
+            # The models already limit the angles of the references.
+            if path[0] == "sweeps" and _impossible(axis, value):
+                yield path, f"{value:g} deg; allowed: {low:g} to {high:g} deg from the normal"
+    for key in ("width_mm", "height_mm"):
+        window = _sound(_POSITIVE, protocol, "window", key)
+        sample = _sound(_POSITIVE, protocol, "sample", key)
+        if window is not None and sample is not None and window > sample:
+            text = f"{window:g} mm is larger than the sample; allowed: at most {sample:g} mm"
+            yield ("window", key), text
+    yield from _repeated(protocol)
+    if check_model is not None:
+        yield from _model_mistakes(protocol, check_model)
+
+
+def _sound(kind: TypeAdapter[Any], marked: MarkedYaml, *path: str | int) -> Any:
+    try:
+        return kind.validate_python(marked.get(path), strict=True)
+    except ValidationError:
+        return None
+
+
+def _impossible(axis: str, value: float) -> bool:
+    low, high = _GEOMETRY_DEG.get(axis, (-np.inf, np.inf))
+    return not low <= value <= high
+
+
+def _items(value: object) -> int:
+    return len(value) if isinstance(value, list) else 0
+
+
+def _written_angles(protocol: MarkedYaml, axis: str) -> Iterator[tuple[KeyPath, float]]:
+    """Yield path and value of the valid angles in the file: whole lists, and ends of steps."""
+    paths: list[KeyPath] = []
+    for sweep in range(_items(protocol.get(("sweeps",)))):
+        angles: KeyPath = ("sweeps", sweep, f"{axis}_deg")
+        ends = [(*angles, "start"), (*angles, "stop")]
+        paths += [(*angles, k) for k in range(_items(protocol.get(angles)))] or ends
+    for path in paths:
+        value = _sound(_DEGREES, protocol, *path)
+        if value is not None:
+            yield path, value
+    if axis == "theta_r":
+        yield from _reference_angles(protocol)
+
+
+def _reference_angles(protocol: MarkedYaml) -> Iterator[tuple[KeyPath, float]]:
+    for reference, section in (("white_tile", WhiteTile), ("drift_check", DriftCheck)):
+        block = protocol.get(("references", reference))
+        if isinstance(block, dict):
+            path: KeyPath = ("references", reference, "theta_r_deg")
+            default = section.model_fields["theta_r_deg"].default
+            value = _sound(_DEGREES, protocol, *path) if "theta_r_deg" in block else default
+            if value is not None:
+                yield path, value
+
+
+def _window_past_picture(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -> Mistakes:
+    width, columns, rows = (
+        _sound(_POSITIVE, rig, "camera", key) for key in ("field_width_mm", "width_px", "height_px")
+    )
+    if width is None:
+        return
+    field_mm = {"width_mm": width}
+    if columns is not None and rows is not None:
+        field_mm["height_mm"] = width * rows / columns
+    for key, size in field_mm.items():
+        window = _sound(_POSITIVE, protocol, "window", key)
+        if window is not None and window > size:
+            place = f"{rig_name}:{rig.mark(('camera', 'field_width_mm')).line}"
+            text = f"{window:g} mm is larger than the camera's field; allowed: at most {size:g} mm"
+            yield ("window", key), f"{text} ({place})"
+
+
+def _repeated(protocol: MarkedYaml) -> Mistakes:
+    """Yield angles that a sweep repeats, and geometries that two sweeps share."""
+    sweeps: dict[int, list[list[float] | Steps]] = {}
+    for sweep in range(_items(protocol.get(("sweeps",)))):
+        paths: list[KeyPath] = [("sweeps", sweep, f"{axis}_deg") for axis in AXES]
+        axes = [_sound(_ANGLES, protocol, *path) for path in paths]
+        for path, angles in zip(paths, axes, strict=True):
+            if isinstance(angles, list):
+                yield from _twice(path, angles)
+        if all(angles is not None for angles in axes):
+            sweeps[sweep] = axes
+    # Counted before they are expanded: a short file can request more than fits into memory.
+    total = sum(math.prod(map(_count, axes)) for axes in sweeps.values())
+    if total > MAX_GEOMETRIES:
+        yield ("sweeps",), f"{total} geometries; allowed: at most {MAX_GEOMETRIES} in a protocol"
+    elif len(sweeps) > 1:
+        yield from _shared(sweeps)
+
+
+def _count(angles: list[float] | Steps) -> int:
+    return angles.num if isinstance(angles, Steps) else len(angles)
+
+
+def _twice(path: KeyPath, angles: list[float]) -> Mistakes:
+    first: dict[float, int] = {}
+    for k, angle in enumerate(angles):
+        earlier = first.setdefault(round(angle, 6), k)
+        if earlier != k:
+            text = f"{angle:g} deg is already in [{earlier}] of this list; allowed: each once"
+            yield (*path, k), text
+
+
+def _shared(sweeps: dict[int, list[list[float] | Steps]]) -> Mistakes:
+    first: dict[tuple[float, ...], int] = {}
+    for sweep, axes in sweeps.items():
+        shared: dict[int, list[tuple[float, ...]]] = {}
+        for geometry in product(*(np.unique(angles_deg(a).round(6)).tolist() for a in axes)):
+            earlier = first.setdefault(geometry, sweep)
+            if earlier != sweep:
+                shared.setdefault(earlier, []).append(geometry)
+        for earlier, geometries in shared.items():
+            values = zip(AXES, geometries[0], strict=True)
+            example = ", ".join(f"{axis} {value:g}" for axis, value in values)
+            yield (
+                ("sweeps", sweep),
+                f"{len(geometries)} of its geometries are already in sweeps[{earlier}], such as "
+                f"{example} deg; allowed: each once",
+            )
+
+
+def _model_mistakes(protocol: MarkedYaml, check_model: ModelCheck) -> Mistakes:
+    paths: list[KeyPath] = [(*_MODELS, k) for k in range(_items(protocol.get(_MODELS)))]
+    for path in (*paths, ("simulated_sample", "model")):
+        name = _sound(_NAME, protocol, *path)
+        text = None if name is None else check_model(name, None)
+        if text is not None:
+            yield path, text
+        elif name is not None and path not in paths:
+            at: KeyPath = ("simulated_sample", "parameters")
+            parameters = _sound(_PARAMETERS, protocol, *at)
+            text = None if parameters is None else check_model(name, parameters)
+            if text is not None:
+                yield at, text
