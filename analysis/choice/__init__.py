@@ -1,1 +1,1 @@
-"""analysis/choice."""
+"""Choice of the simplest adequate reflectance model for measurements. Open `choice.py` first."""

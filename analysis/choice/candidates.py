@@ -1,4 +1,4 @@
-"""The models that compete for the data: their first fits, and which of these are worth more."""
+"""Candidate models: their first fits, and the full fits of those that may compete."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ import numpy as np
 
 from analysis.accuracy.cheapest import cheapest
 from analysis.accuracy.rough_surface import ROUGH_SURFACE
-from analysis.choice.ladder import SAME_PREDICTION, approximation
+from analysis.choice.ladder import SAME_PREDICTION, functional_form
 from analysis.data.acceptance import Acceptance
 from analysis.data.measurements import Measurements
-from analysis.fit.first_fit import FirstFit, determined, multi_start, quick_fit
-from analysis.fit.fit import FitResult, refined
-from analysis.fit.relative_scale import NAME as RELATIVE_FACTOR
-from analysis.fit.relative_scale import normalise_lamp_levels
+from analysis.fit.first_fit import FirstFit, enough_points, multi_start, quick_fit
+from analysis.fit.fit import FitResult, refine
+from analysis.fit.relative_scale import FACTOR_NAME, normalise_lamp_levels
 from analysis.models import MODELS
 from instrument.errors import NotDetermined
 
-# A first fit with so many times the best one's chi2 is not brought near it by averaging over the
-# rig, or from another basin.
-_HOPELESS = 25.0
+# Ratio of chi2 to that of the best first fit, beyond which neither averaging over the rig nor
+# another local minimum makes a model competitive.
+_RULED_OUT_CHI2 = 25.0
 
 
 @dataclass(frozen=True, slots=True)
 class Candidates:
-    """First fits to the measurements, in the order of the names, and names with too few points.
+    """First fits to the measurements in the order of the names, and models left out.
 
-    every: an integrated model is fitted whether or not it may differ from its functional form.
+    every: fit an integrated model even where its functional form is accurate enough.
+    left_out: models with too many parameters for the points.
     """
 
     measurements: Measurements
@@ -41,9 +41,9 @@ class Candidates:
     def of(
         cls, names: Sequence[str], measurements: Measurements, robust: bool, every: bool
     ) -> Candidates:
-        """First fits of the models called so.
+        """First fits of the named models.
 
-        Raises `NotDetermined` where the points are too few for any, `KeyError` for an unknown one.
+        Raises `NotDetermined` where the points are too few for all, `KeyError` for an unknown one.
         """
         found = cls(measurements, robust, every).with_more(names)
         if not found.first:
@@ -51,32 +51,32 @@ class Candidates:
                 f"{measurements.size} points are too few to fit any of: {', '.join(names)}"
             )
         if measurements.free_levels:
-            level = normalise_lamp_levels(measurements, _best(found.first).brdf)
-            return cls(level, robust, every).with_more(names)
+            normalised = normalise_lamp_levels(measurements, _best(found.first).brdf)
+            return cls(normalised, robust, every).with_more(names)
         return found
 
     def with_more(self, names: Sequence[str]) -> Candidates:
-        """These candidates and further ones."""
+        """Add further models to the candidates."""
         m = self.measurements
         quick = {f.problem.model.name: f for f in self.first}
         named = [MODELS[name] for name in names]
-        for model in (model for model in named if determined(model, m)):
-            form = quick.get(approximation(model.name) or "")
-            if self.every or form is None or _leaves_integral(form, m):
+        for model in (model for model in named if enough_points(model, m)):
+            form = quick.get(functional_form(model.name) or "")
+            if self.every or form is None or _form_inaccurate(form, m):
                 quick[model.name] = quick_fit(model, m)
         best = _best(quick.values()) if quick else None
         first = tuple(
             f if best is None or _ruled_out(f, best, m) else multi_start(f, m, self.robust)
             for f in quick.values()
         )
-        few = tuple(model.name for model in named if not determined(model, m))
+        few = tuple(model.name for model in named if not enough_points(model, m))
         return replace(self, first=first, left_out=(*self.left_out, *few))
 
     def refined(self, acceptance: Acceptance | None) -> tuple[FitResult, ...]:
-        """Each fitted with all uncertainties, around the smooth curve of the best one."""
+        """Fit each with all uncertainties, linearised about the best first fit."""
         m, best = self.measurements, _best(self.first)
         return tuple(
-            refined(f, m, acceptance, best.brdf, _ruled_out(f, best, m)) for f in self.first
+            refine(f, m, acceptance, best.brdf, _ruled_out(f, best, m)) for f in self.first
         )
 
 
@@ -84,19 +84,19 @@ def _best(first: Iterable[FirstFit]) -> FirstFit:
     return min(first, key=lambda f: (not f.solution.converged, f.bic))
 
 
-def _leaves_integral(form: FirstFit, measurements: Measurements) -> bool:
-    """Whether the functional form, as fitted, is off the integral by more than u/3 anywhere."""
+def _form_inaccurate(form: FirstFit, measurements: Measurements) -> bool:
+    """True if the fitted functional form deviates from the integral by more than u/3 anywhere."""
     names = [p.name for p in form.problem.model.parameters]
     values = dict(zip(names, map(float, form.solution.x), strict=True))
     at = {name: values[name] for name in ("albedo", "sigma_deg")}
     rough = MODELS["oren_nayar"].brdf(measurements.geometry, **at)
-    rough *= values.get(RELATIVE_FACTOR, 1.0)
+    rough *= values.get(FACTOR_NAME, 1.0)
     u = measurements.u_random
     if u is None:
-        left = form.problem.predict(form.solution.x) - measurements.brdf
-        u = np.full(measurements.size, float(np.sqrt(np.mean(np.square(left)))))
+        residual = form.problem.predict(form.solution.x) - measurements.brdf
+        u = np.full(measurements.size, float(np.sqrt(np.mean(np.square(residual)))))
     allowed = np.divide(SAME_PREDICTION * u, np.abs(rough), out=np.ones_like(u), where=rough != 0)
-    # Data without noise may ask for more than even the integral keeps.
+    # Data without noise may require more than the accuracy of the integral itself.
     allowed = np.maximum(allowed, ROUGH_SURFACE.accuracy(measurements.geometry))
     ranges = {name: (value, value) for name, value in at.items()}
     found = cheapest(ROUGH_SURFACE, measurements.geometry, ranges, allowed, among=("functional",))
@@ -104,6 +104,6 @@ def _leaves_integral(form: FirstFit, measurements: Measurements) -> bool:
 
 
 def _ruled_out(fit: FirstFit, best: FirstFit, m: Measurements) -> bool:
-    """Whether neither averaging over the rig nor another basin can bring a model near the best."""
+    """True if neither averaging nor another local minimum can make a model competitive."""
     enough = 0.0 if m.u_random is None else float(m.size)
-    return fit.solution.chi2 > _HOPELESS * max(best.solution.chi2, enough)
+    return fit.solution.chi2 > _RULED_OUT_CHI2 * max(best.solution.chi2, enough)

@@ -1,7 +1,7 @@
-"""Which model: the simplest that the data cannot tell from the best, or none that is adequate.
+"""Choice of the simplest model that explains the data as well as the best, or of none.
 
-A larger model has to earn its parameters twice: by Schwarz's criterion (BIC), and by foretelling
-incidences or blocks of view angle that were left out of its fit.
+Each further parameter must improve Schwarz's criterion (BIC), and the prediction of incidences or
+blocks of view angles held out of the fit.
 """
 
 from __future__ import annotations
@@ -13,34 +13,41 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.choice.candidates import Candidates
-from analysis.choice.cross_validation import folds, held_out
-from analysis.choice.ladder import LADDER, RICH, SAME_PREDICTION, MethodOfFit, of_method, physics
-from analysis.choice.runs_test import failures, runs_probability
+from analysis.choice.cross_validation import folds, held_out_error
+from analysis.choice.ladder import (
+    LADDER,
+    RICH,
+    SAME_PREDICTION,
+    MethodOfFit,
+    physics,
+    with_method,
+)
+from analysis.choice.runs_test import runs_probability, worst_stretches
 from analysis.choice.symmetry_test import Symmetry, p_text, symmetry
 from analysis.data.acceptance import Acceptance
 from analysis.data.measurements import Measurements
-from analysis.fit.criteria import LEAST_NOISE, UNLIKELY, probability
+from analysis.fit.criteria import LEAST_NOISE, SIGNIFICANCE, probability
 from analysis.fit.fit import FitResult
 from instrument.geometry import FloatArray
 
-# A larger BIC by less than this is no evidence (Kass and Raftery, "Bayes Factors", 1995: "not
-# worth more than a bare mention").
+# A smaller difference of BIC is no evidence (Kass and Raftery, "Bayes Factors", 1995: "not worth
+# more than a bare mention").
 TIE_BIC = 2.0
-# Such a cheaper method may leave this many times the chi2 that the better one leaves.
+# Ratio of chi2 up to which a cheaper method with the same predictions is preferred.
 SAME_CHI2 = 2.0
-MOST_RMS_RELATIVE = 0.05
-# Below this reduced chi2 the stated u is not the points' own scatter, but holds errors that they
-# share: what they then leave in a row is inside u.
-_NOT_SCATTER = 0.5
+MAX_RMS_RELATIVE = 0.05
+# A smaller reduced chi2 shows that the stated u includes errors that points share. Residuals of one
+# sign in a row are then expected.
+_SHARED_U_CHI2 = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """All candidates as fitted, the chosen one's name, a verdict on it, and why.
+    """All fitted candidates, the name of the chosen one, the verdict on it, and its reason.
 
     verdict: "adequate", "none adequate" or "not identifiable" (it agrees, but has a parameter
-    that the data do not determine). `chosen` is None only where no fit converged. symmetry: the
-    test of 1998, section 3.1, None where nothing is chosen.
+    that the data do not determine). `chosen` is None only where no fit converged. symmetry: test
+    of Wolff, Nayar and Oren (1998), section 3.1; None where no model is chosen.
     """
 
     candidates: tuple[FitResult, ...]
@@ -59,22 +66,22 @@ def choose(
 ) -> Choice:
     """Fit every model and choose the simplest that explains the data as well as the best does.
 
-    Without `models` they are those of the ladder, and where these do not explain the data the rich
-    ones too; an integrated model whose functional form is as good is then left out, unless a
-    `method` for the rough surface is asked for. Models with too many parameters for the points are
-    left out. Raises `NotDetermined` when too few points leave none of them, `KeyError` for an
-    unknown model.
+    Without `models`, the candidates are LADDER and, where these do not explain the data, also RICH;
+    an integrated model whose functional form is as accurate is then left out, unless a `method` for
+    the rough surface is requested. Models with too many parameters for the points are left out.
+    Raises `NotDetermined` when the points are too few for all of them, `KeyError` for an unknown
+    model.
     """
-    names = of_method(models or LADDER, method)
+    names = with_method(models or LADDER, method)
     candidates = Candidates.of(names, measurements, robust, every=models is not None)
     choice = _chosen(candidates, acceptance)
     if models is not None or _explained(choice):
         return choice
-    return _chosen(candidates.with_more(of_method(RICH, method)), acceptance)
+    return _chosen(candidates.with_more(with_method(RICH, method)), acceptance)
 
 
 def _explained(choice: Choice) -> bool:
-    """Whether nothing is left for a larger model: no more than the stated u, or than rounding."""
+    """True if the chosen model agrees within the stated u, or to rounding where none is stated."""
     chosen = next((c for c in choice.candidates if c.model == choice.chosen), None)
     if chosen is None or chosen.chi2 is not None:
         return chosen is not None and choice.verdict != "none adequate"
@@ -88,11 +95,11 @@ def _chosen(tried: Candidates, acceptance: Acceptance | None) -> Choice:
         return Choice(candidates, None, "none adequate", "no fit converged")
     best = min(converged, key=lambda c: c.bic)
     chosen = _simplest(converged, best, measurements)
-    verdict, reason = _judged(chosen, measurements)
+    verdict, reason = _verdict(chosen, measurements)
     if chosen is not best:
-        reason += f"; {best.model}, which has the best BIC, does not earn what it costs"
+        reason += f"; {best.model} has the lowest BIC, but not enough to justify its complexity"
     if tried.left_out:
-        reason += f"; left out, too few points: {', '.join(tried.left_out)}"
+        reason += f"; left out for lack of points: {', '.join(tried.left_out)}"
     noise = max(chosen.rms_relative, LEAST_NOISE) * float(np.mean(measurements.brdf))
     tested = symmetry(measurements, chosen.brdf, noise)
     return Choice(candidates, chosen.model, verdict, reason, tested)
@@ -101,32 +108,32 @@ def _chosen(tried: Candidates, acceptance: Acceptance | None) -> Choice:
 def _simplest(
     converged: Iterable[FitResult], best: FitResult, measurements: Measurements
 ) -> FitResult:
-    """The last of the candidates, by rising number of parameters and cost, that earns its place."""
+    """The simplest candidate on which no larger or costlier one improves enough."""
     left_out = folds(measurements)
     scores: dict[str, float] = {}
 
     def score(candidate: FitResult) -> float:
         if candidate.model not in scores:
-            scores[candidate.model] = held_out(
+            scores[candidate.model] = held_out_error(
                 measurements, candidate.problem, candidate.x, left_out
             )
         return scores[candidate.model]
 
     current, *larger = sorted(converged, key=lambda c: c.x.size)  # stable: the ladder's order
     for candidate in larger:
-        better = _bic_above(current, candidate, best, measurements.size) > TIE_BIC
-        if not better or _same(current, candidate):
+        better = _bic_difference(current, candidate, best, measurements.size) > TIE_BIC
+        if not better or _equivalent(current, candidate):
             continue
         if not left_out or score(candidate) < score(current):
             current = candidate
     return current
 
 
-def _bic_above(candidate: FitResult, other: FitResult, best: FitResult, points: int) -> float:
-    """How far a candidate's BIC lies above another's, misfit of the best counting as noise.
+def _bic_difference(candidate: FitResult, other: FitResult, best: FitResult, points: int) -> float:
+    """BIC of a candidate minus that of another, with the misfit of the best counted as noise.
 
-    Where even the best model leaves more than the stated u explains, that unknown error is not
-    evidence for any model: chi2 is scaled by the best one's reduced chi2 (Birge 1932).
+    Where even the best model does not agree within the stated u, the unknown error is no evidence
+    for any model: chi2 is scaled by the best one's reduced chi2 (Birge 1932).
     """
     if candidate.chi2 is None or other.chi2 is None:
         return candidate.bic - other.bic
@@ -135,27 +142,28 @@ def _bic_above(candidate: FitResult, other: FitResult, best: FitResult, points: 
     return loss / max(1.0, best.reduced_chi2 or 1.0) + more * math.log(points)
 
 
-def _same(cheaper: FitResult, other: FitResult) -> bool:
-    """Whether two methods for one physics predict the same within u, and explain about as much."""
+def _equivalent(cheaper: FitResult, other: FitResult) -> bool:
+    """True for methods of one physics with the same predictions within u/3 and a similar chi2."""
     if physics(cheaper.model) != physics(other.model):
         return False
     if np.any(np.abs(cheaper.predicted - other.predicted) >= SAME_PREDICTION * other.u_total):
         return False
     if cheaper.chi2 is None or other.chi2 is None:
         return True
-    return cheaper.chi2 <= SAME_CHI2 * other.chi2 or _probability(cheaper) > UNLIKELY
+    return cheaper.chi2 <= SAME_CHI2 * other.chi2 or _probability(cheaper) > SIGNIFICANCE
 
 
 def _probability(result: FitResult) -> float:
     return 1.0 if result.chi2 is None else probability(result.chi2, result.dof)
 
 
-def _judged(chosen: FitResult, measurements: Measurements) -> tuple[str, str]:
+def _verdict(chosen: FitResult, measurements: Measurements) -> tuple[str, str]:
     if chosen.dof <= 0:
-        return "not identifiable", f"{chosen.model}: as many parameters as points, nothing to test"
+        return "not identifiable", f"{chosen.model}: as many parameters as points, no test possible"
     adequate, reason = _adequate(chosen, measurements)
     if not adequate:
-        return "none adequate", f"{reason}; worst at {_worst(chosen, measurements)}"
+        worst = worst_stretches(measurements, _without_outliers(chosen))
+        return "none adequate", f"{reason}; worst at {'; '.join(map(str, worst))}"
     if chosen.undetermined:
         names = ", ".join(
             f"{name} (anywhere in {chosen.intervals[name][0]:.4g} to "
@@ -167,28 +175,25 @@ def _judged(chosen: FitResult, measurements: Measurements) -> tuple[str, str]:
 
 
 def _adequate(chosen: FitResult, measurements: Measurements) -> tuple[bool, str]:
-    aside = int(np.sum(chosen.outliers))
-    set_aside = f", {aside} outliers set aside" if aside else ""
+    outliers = int(np.sum(chosen.outliers))
+    set_aside = f", {outliers} outliers set aside" if outliers else ""
     if chosen.chi2 is None:
         rms = 100 * chosen.rms_relative
-        words = f"{chosen.model}: rms residual {rms:.3g} % of the mean, allowed 5 % (no u stated)"
-        return chosen.rms_relative <= MOST_RMS_RELATIVE, words + set_aside
-    by_chi2, by_runs = _probability(chosen), runs_probability(measurements, _kept(chosen))
-    words = (
+        text = f"{chosen.model}: rms residual {rms:.3g} % of the mean, allowed 5 % (no u stated)"
+        return chosen.rms_relative <= MAX_RMS_RELATIVE, text + set_aside
+    by_chi2 = _probability(chosen)
+    by_runs = runs_probability(measurements, _without_outliers(chosen))
+    text = (
         f"{chosen.model}: chi2 {chosen.chi2:.4g} for {chosen.dof} degrees of freedom, "
-        f"{p_text(by_chi2)}; runs of residuals of one sign, {p_text(by_runs)} "
-        f"(rejected below {UNLIKELY:g})"
+        f"{p_text(by_chi2)}; runs test of the residuals' signs, {p_text(by_runs)} "
+        f"(rejected below {SIGNIFICANCE:g})"
     )
-    if chosen.chi2 < _NOT_SCATTER * chosen.dof:
-        words += "; the stated u is more than the points scatter, so runs do not count"
+    if chosen.chi2 < _SHARED_U_CHI2 * chosen.dof:
+        text += "; the stated u exceeds the scatter of the points, so the runs test is ignored"
         by_runs = 1.0
-    return min(by_chi2, by_runs) > UNLIKELY, words + set_aside
+    return min(by_chi2, by_runs) > SIGNIFICANCE, text + set_aside
 
 
-def _kept(result: FitResult) -> FloatArray:
-    """Residuals, 0 for the points that are set aside: a run has no sign there."""
+def _without_outliers(result: FitResult) -> FloatArray:
+    """Residuals (N,) in units of u, 0 at outliers, which thereby belong to no run of one sign."""
     return np.where(result.outliers, 0.0, result.residuals)
-
-
-def _worst(chosen: FitResult, measurements: Measurements) -> str:
-    return "; ".join(map(str, failures(measurements, _kept(chosen))))

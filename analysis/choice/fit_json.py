@@ -1,4 +1,4 @@
-"""The choice of a model as `fit.json` holds it."""
+"""Content of `fit.json`: the choice of a model as plain values for JSON."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from analysis.fit.fit import FitResult
 
 
 def to_json(choice: Choice) -> dict[str, Any]:
-    """The choice as `fit.json` holds it: for `json.dumps(..., allow_nan=False)`."""
+    """Convert a choice for `json.dumps(..., allow_nan=False)`."""
     return {
         "chosen": choice.chosen,
         "verdict": choice.verdict,
@@ -21,8 +21,8 @@ def to_json(choice: Choice) -> dict[str, Any]:
     }
 
 
-def nothing(reason: str) -> dict[str, Any]:
-    """What is written where no model could be fitted."""
+def no_fit_json(reason: str) -> dict[str, Any]:
+    """Content where no model could be fitted, with the reason."""
     return {
         "chosen": None,
         "verdict": "not identifiable",
@@ -47,7 +47,7 @@ def _candidate(result: FitResult) -> dict[str, Any]:
 
 def _symmetry(tested: Symmetry) -> dict[str, Any]:
     return {
-        "says": tested.says,
+        "says": tested.outcome,
         "pairs": tested.pairs,
         "asymmetry": _number(tested.asymmetry),
         "probability": _number(tested.probability),

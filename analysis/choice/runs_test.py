@@ -1,7 +1,7 @@
-"""Structure in residuals: what a model leaves in a row on one side is no noise.
+"""Runs test of residuals: too few changes of sign along a sweep show a systematic misfit.
 
 Source: A. Wald, J. Wolfowitz, "On a Test Whether Two Samples Are from the Same Population", Annals
-of Mathematical Statistics 11 (1940): the number of runs of equal signs.
+of Mathematical Statistics 11 (1940).
 """
 
 from __future__ import annotations
@@ -13,18 +13,19 @@ import numpy as np
 from scipy.special import ndtr
 
 from analysis.data.measurements import Measurements
-from analysis.data.sweeps import Sweep, in_plane, sweeps
+from analysis.data.sweeps import Sweep, plane_and_view, sweeps
 from instrument.geometry import FloatArray, IntArray
 
-# A stretch counts as a failure from this many standard deviations of its mean.
+# A further stretch is reported from this many standard deviations of its mean.
 _NOTABLE = 3.0
 
 
 def runs_probability(m: Measurements, residuals: FloatArray) -> float:
-    """Of as few runs of equal signs as this or fewer, in all sweeps together, if all is noise.
+    """Probability of at most this many runs of equal signs, in all sweeps, if all is noise.
 
-    `residuals` (N,) belong to the points; 1 where no sweep has residuals of both signs. Few points
-    or alternating residuals give 1: only runs that are too long speak against a model.
+    `residuals` (N,) in units of u, in the order of the points. 1 where no sweep has residuals of
+    both signs, for few points and for alternating residuals: only runs that are too long are
+    evidence against a model.
     """
     counted = [_runs(residuals[sweep.points]) for sweep in sweeps(m)]
     runs, expected, variance = np.sum(np.reshape(counted, (-1, 3)), axis=0)
@@ -34,7 +35,7 @@ def runs_probability(m: Measurements, residuals: FloatArray) -> float:
 
 
 def _runs(residuals: FloatArray) -> tuple[float, float, float]:
-    """Runs of equal signs in a row of residuals, and their expectation and variance."""
+    """Number of runs of equal signs in a row of residuals, its expectation and its variance."""
     sign = np.sign(residuals[residuals != 0])
     n, plus = sign.size, int(np.sum(sign > 0))
     if n < 2:
@@ -45,7 +46,10 @@ def _runs(residuals: FloatArray) -> tuple[float, float, float]:
 
 
 class Stretch(NamedTuple):
-    """Neighbours of a sweep that a model misses on one side; `mean` residual in units of u."""
+    """Neighbouring points of a sweep with residuals of one sign, of `mean` in units of u.
+
+    Angles in degrees. weight: mean residual over its standard deviation if all were noise.
+    """
 
     theta_i_deg: float
     dphi_deg: float
@@ -64,16 +68,17 @@ class Stretch(NamedTuple):
         )
 
 
-def failures(m: Measurements, residuals: FloatArray, most: int = 3) -> list[Stretch]:
-    """Where a model fails worst, the worst first; `residuals` (N,) in units of u, 0: set aside.
+def worst_stretches(m: Measurements, residuals: FloatArray, most: int = 3) -> list[Stretch]:
+    """At most `most` stretches where a model fits worst, the worst first.
 
-    The weight of a stretch is its mean residual over what noise would leave of it.
+    `residuals` (N,) are in units of u, 0 for points set aside. All but the first of the stretches
+    are significant.
     """
-    plane, views = in_plane(m)
+    plane, views = plane_and_view(m)
     swept = sweeps(m)
     inside = np.concatenate([s.points for s in swept]) if swept else np.zeros(0, dtype=np.int64)
-    alone = np.setdiff1d(np.arange(m.size), inside)
-    single = [Sweep(float(m.theta_i_deg[k]), float(plane[k]), np.array([k])) for k in alone]
+    outside = np.setdiff1d(np.arange(m.size), inside)
+    single = [Sweep(float(m.theta_i_deg[k]), float(plane[k]), np.array([k])) for k in outside]
     found = [
         _stretch(sweep, part, views, residuals)
         for sweep in (*swept, *single)
@@ -84,6 +89,7 @@ def failures(m: Measurements, residuals: FloatArray, most: int = 3) -> list[Stre
 
 
 def _one_sided(points: IntArray, residuals: FloatArray) -> list[IntArray]:
+    """The points split where the sign of the residuals changes, without residuals of 0."""
     points = points[residuals[points] != 0]
     if points.size == 0:
         return []

@@ -1,4 +1,4 @@
-"""Rough or smooth? Whether a surface looks alike from both sides of its normal.
+"""Symmetry test: a surface is rough if its reflection differs on both sides of the normal.
 
 Source: L. B. Wolff, S. K. Nayar, M. Oren, "Improved Diffuse Reflection Models for Computer Vision",
 International Journal of Computer Vision 30 (1998), section 3.1: at a fixed incidence a smooth
@@ -12,29 +12,32 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
-from analysis.data.covariance import Covariance, change, shared, with_column
+from analysis.data.covariance import (
+    Covariance,
+    angle_sensitivity,
+    append_column,
+    full_covariance,
+)
 from analysis.data.measurements import Measurements
-from analysis.data.sweeps import in_plane, sweeps
+from analysis.data.sweeps import plane_and_view, sweeps
+from analysis.fit.criteria import SIGNIFICANCE
 from instrument.geometry import Brdf, IntArray
 
-# A difference less probable than this is one of the surface.
-UNLIKELY = 1e-3
-# Nearer to the normal the lamp itself is too symmetric, and so is the dphi = 90 degrees plane.
-_LEAST_THETA_I_DEG = 5.0
-_LEAST_OFF_DEG = 5.0
-# The same view angle on both sides, in degrees.
-_SAME = 0.01
+# Nearer to normal incidence, or to the plane dphi = 90 degrees, any surface is too symmetric.
+_MIN_THETA_I_DEG = 5.0
+_MIN_OFF_PLANE_DEG = 5.0
+_SAME_VIEW_DEG = 0.01
 
 
 class Symmetry(NamedTuple):
-    """The test's outcome.
+    """Result of the test.
 
-    says: "rough" (asymmetric), "smooth" (symmetric) or "not tested" (no pairs of view angles).
-    pairs: how many were compared. asymmetry: (lamp's side - mirror side) over their sum, the mean
-    over the pairs. probability: of differences as large as these if the surface were symmetric.
+    outcome: "rough" (asymmetric), "smooth" (symmetric) or "not tested" (no pairs of view angles).
+    pairs: number of pairs compared. asymmetry: mean difference of lamp's side and mirror side over
+    the mean of their sum. probability: of differences at least as large on a symmetric surface.
     """
 
-    says: str
+    outcome: str
     pairs: int
     asymmetry: float
     probability: float
@@ -44,21 +47,21 @@ class Symmetry(NamedTuple):
             return "symmetry in theta_r: not tested (no view angle on both sides of the normal)"
         side = "lamp's" if self.asymmetry > 0 else "mirror"
         return (
-            f"symmetry in theta_r: {self.says} ({self.pairs} pairs; {side} side brighter by "
+            f"symmetry in theta_r: {self.outcome} ({self.pairs} pairs; {side} side brighter by "
             f"{200 * abs(self.asymmetry):.2g} %, {p_text(self.probability)})"
         )
 
 
 def p_text(probability: float) -> str:
-    """A probability as people read it; how small a very small one is says nothing."""
+    """A probability as text; very small ones are only bounded."""
     return f"p = {probability:.2g}" if probability >= 1e-9 else "p < 1e-9"
 
 
 def symmetry(m: Measurements, smooth: Brdf, noise: float) -> Symmetry:
     """Compare the points at theta_r with those at -theta_r of the same sweep.
 
-    `smooth` is a model near the data, which turns errors of angles into such of the BRDF; `noise`,
-    in 1/sr, is the standard deviation of a point where the measurements state no u.
+    `smooth` is a model near the data (BRDF in 1/sr, of the geometry's shape), which converts errors
+    of angles; `noise`, in 1/sr, is the standard deviation of a point where no u is stated.
     """
     pairs = _pairs(m)
     if not pairs:
@@ -69,43 +72,43 @@ def symmetry(m: Measurements, smooth: Brdf, noise: float) -> Symmetry:
     white = _covariance(m, smooth, noise, lamp, mirror).whiten(difference)
     chi2 = float(white @ white)
     probability = float(chdtrc(float(len(pairs)), chi2))
-    says = "rough" if probability < UNLIKELY else "smooth"
-    return Symmetry(says, len(pairs), float(np.mean(difference) / np.mean(total)), probability)
+    outcome = "rough" if probability < SIGNIFICANCE else "smooth"
+    return Symmetry(outcome, len(pairs), float(np.mean(difference) / np.mean(total)), probability)
 
 
 def _pairs(m: Measurements) -> list[tuple[int, int]]:
-    """Places of the points on the lamp's side, and of their twins on the mirror side, each once."""
-    _, views = in_plane(m)
+    """Indices of points on the lamp's side and their mirror images in theta_r, each used once."""
+    _, views = plane_and_view(m)
     found = []
     for theta_i, dphi, points in sweeps(m):
-        if theta_i < _LEAST_THETA_I_DEG or abs(dphi - 90) < _LEAST_OFF_DEG:
+        if theta_i < _MIN_THETA_I_DEG or abs(dphi - 90) < _MIN_OFF_PLANE_DEG:
             continue
         towards = 1.0 if dphi < 90 else -1.0  # the sign of theta_r on the lamp's side
         sides = towards * views[points]
         free = np.ones(sides.size, dtype=bool)
-        for k in np.flatnonzero(sides > _SAME):
-            apart = np.where(free, np.abs(sides + sides[k]), np.inf)
-            twin = int(np.argmin(apart))
-            if apart[twin] < _SAME:
-                free[twin] = False
-                found.append((int(points[k]), int(points[twin])))
+        for k in np.flatnonzero(sides > _SAME_VIEW_DEG):
+            distance = np.where(free, np.abs(sides + sides[k]), np.inf)
+            mirror = int(np.argmin(distance))
+            if distance[mirror] < _SAME_VIEW_DEG:
+                free[mirror] = False
+                found.append((int(points[k]), int(points[mirror])))
     return found
 
 
 def _covariance(
     m: Measurements, smooth: Brdf, noise: float, lamp: IntArray, mirror: IntArray
 ) -> Covariance:
-    """Covariance of the differences of P pairs; no point is in two of them.
+    """Covariance of the differences of P pairs; no point belongs to two of them.
 
-    All theta_r may be off alike by u, too: a zero that is off shifts the two sides apart, which
-    many points would show as asymmetry if the error of each were independent.
+    An error of the zero of theta_r, of the same u, is added: it shifts the two sides in opposite
+    directions, and many points with independent errors would show that as asymmetry.
     """
     if m.u_random is None:
         return Covariance(np.full(lamp.size, 2 * noise**2), np.zeros((lamp.size, 0)))
-    C = shared(m, smooth)
-    turned = np.where(in_plane(m)[1] == m.theta_r_deg, 1.0, -1.0)
-    zero = turned * change(m, smooth, theta_r=m.u_theta_r_deg)
+    C = full_covariance(m, smooth)
+    sign = np.where(plane_and_view(m)[1] == m.theta_r_deg, 1.0, -1.0)
+    zero = sign * angle_sensitivity(m, smooth, theta_r=m.u_theta_r_deg)
     return Covariance(
         C.variance[lamp] + C.variance[mirror],
-        with_column(C.common[lamp] - C.common[mirror], zero[lamp] - zero[mirror]),
+        append_column(C.common[lamp] - C.common[mirror], zero[lamp] - zero[mirror]),
     )

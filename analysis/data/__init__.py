@@ -1,1 +1,1 @@
-"""analysis/data."""
+"""Measurements, their covariance, and readers of data files. Open `measurements.py` first."""

@@ -1,13 +1,13 @@
-"""What a rig really averages over: the lamp's disc, the camera's lens and the measured patch.
+"""Acceptance of a rig: BRDF and radiance averaged over lamp disc, camera lens and measured patch.
 
-A BRDF is defined for two single directions; a rig sees a mean over two cones and an area. That
-mean is taken here in full: inverse-square law, local angles at each point of the sample, and no
-light from below the horizon.
+A BRDF is defined for two single directions; a rig measures its mean over two cones and an area.
+The mean includes the inverse-square law, the local angles at each point of the sample, and no light
+from below the horizon.
 
 Axes as in `instrument/geometry.py`, in mm, with the origin where the rotation axis meets the
-sample. The lamp and the lens are flat discs that face the origin, each of the radius that makes
-the cone of its solid angle; the lamp radiates alike from all its area and in all directions, so
-that each part of it gives an irradiance that goes as cos(local theta_i) / distance squared.
+sample. Lamp and lens are flat discs that face the origin, with the radius of the cone of their
+solid angle. The lamp radiates uniformly over its area and in all directions, so that the irradiance
+by each part of it is proportional to cos(local theta_i) / distance squared.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ if TYPE_CHECKING:
     from instrument.config.rig import Rig
 
 
-MOST_RINGS = 6
+MAX_RINGS = 6
 
-# Evaluations at once: few enough that the arrays stay in the processor's cache.
+# Evaluations in one block: few enough that the arrays stay in the processor's cache.
 _BLOCK = 32_768
 _X_AXIS = np.array([1.0, 0.0, 0.0])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Acceptance:
     """Sizes of lamp, lens and patch: distances in mm, solid angles in sr as seen from the origin.
 
@@ -67,26 +67,26 @@ class Acceptance:
 
     @classmethod
     def of(cls, rig: Rig, window: PatchConfig) -> Acceptance:
-        """Acceptance of a rig file and of the window that a protocol measures."""
+        """Acceptance of a rig, for the window that a protocol measures."""
         return cls(
-            rig.beam_length_mm,
-            rig.lamp_distance_mm,
-            rig.source_solid_angle_sr,
-            rig.receiver_solid_angle_sr,
-            window.width_mm,
-            window.height_mm,
+            beam_length_mm=rig.beam_length_mm,
+            lamp_distance_mm=rig.lamp_distance_mm,
+            source_solid_angle_sr=rig.source_solid_angle_sr,
+            receiver_solid_angle_sr=rig.receiver_solid_angle_sr,
+            patch_width_mm=window.width_mm,
+            patch_height_mm=window.height_mm,
         )
 
     def patch(self, nodes: int) -> tuple[FloatArray, FloatArray]:
-        """Gauss-Legendre points on the patch, (nodes^2, 3) in mm, and weights that sum to 1."""
+        """Gauss-Legendre points on the patch (P, 3) in mm, weights (P,) of sum 1, P = nodes^2."""
         t, w = np.polynomial.legendre.leggauss(nodes)
         x, y = np.meshgrid(t * self.patch_width_mm / 2, t * self.patch_height_mm / 2)
         points = np.stack([x.ravel(), y.ravel(), np.zeros(nodes * nodes)], axis=-1)
         return points, np.outer(w, w).ravel() / 4
 
 
-def _require(name: str, holds: bool, value: float, allowed: str) -> None:
-    if not (holds and np.isfinite(value)):
+def _require(name: str, valid: bool, value: float, allowed: str) -> None:
+    if not (valid and np.isfinite(value)):
         raise ValueError(f"{name} = {value:g}; allowed: {allowed}, finite")
 
 
@@ -95,22 +95,23 @@ def disc_rule(rings: int, turn: float = 0.0) -> tuple[FloatArray, FloatArray]:
     """Quadrature over the unit disc: nodes (M, 2) and weights (M,) that sum to 1, M = 4 rings^2.
 
     Gauss-Legendre in the square of the radius, 4 rings equally spaced angles: the mean of every
-    polynomial in x, y up to degree 4 rings - 1 is exact. `turn` rotates the nodes by that part of
-    the angle between two of them. rings = 0 is the centre alone (exact to degree 1). The arrays
-    are shared and read-only. Raises `ValueError` for negative `rings`.
+    polynomial in x, y up to degree 4 rings - 1 is exact. `turn` rotates the nodes by that fraction
+    of the angle between two of them. rings = 0 is the centre alone (exact to degree 1). The arrays,
+    in units of the disc's radius, are cached and read-only. Raises `ValueError` for negative
+    `rings`.
     """
     if rings < 0:
         raise ValueError(f"rings = {rings}; allowed: 0 or more")
     if rings == 0:
-        return _frozen(np.zeros((1, 2))), _frozen(np.ones(1))
+        return _read_only(np.zeros((1, 2))), _read_only(np.ones(1))
     t, w = np.polynomial.legendre.leggauss(rings)
     radius = np.sqrt((t + 1) / 2)[:, np.newaxis]
     angle = 2 * np.pi * (np.arange(4 * rings) + turn) / (4 * rings)
     nodes = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1).reshape(-1, 2)
-    return _frozen(nodes), _frozen(np.repeat(w / 2, 4 * rings) / (4 * rings))
+    return _read_only(nodes), _read_only(np.repeat(w / 2, 4 * rings) / (4 * rings))
 
 
-def _frozen(array: FloatArray) -> FloatArray:
+def _read_only(array: FloatArray) -> FloatArray:
     array.setflags(write=False)
     return array
 
@@ -124,16 +125,16 @@ def radiance(
     acceptance: Acceptance,
     rings: int,
 ) -> FloatArray:
-    """Mean radiance over the lens of points of the sample, for a lamp that gives irradiance 1.
+    """Radiance of points of the sample, averaged over the lens, for a lamp of irradiance 1.
 
-    The lamp's irradiance is 1 at the origin at normal incidence; each part of the lens counts
-    with cos(local theta_r) / distance squared, and the weights sum to 1. Parts of the lens or of
-    the lamp below a point's horizon see nothing and give nothing; a point that sees no lens or no
-    lamp at all has radiance 0.
+    The irradiance is 1 at the origin at normal incidence. Parts of the lens are weighted by
+    cos(local theta_r) / distance squared, with weights of sum 1. Parts of lens or lamp below a
+    point's horizon have no weight; a point from which no part of the lens or of the lamp is visible
+    has radiance 0.
 
-    `points_mm` has the shape (..., 3); the angles in degrees broadcast, with `theta_r_deg`
-    signed. The result has the angles' shape followed by that of the points: (N,) and (P, 3) give
-    (N, P).
+    `points_mm` has the shape (..., 3); the angles in degrees broadcast, with `theta_r_deg` signed;
+    `brdf` is in 1/sr. The result has the angles' shape followed by that of the points: (N,) and
+    (P, 3) give (N, P).
     """
     return _radiance(brdf, points_mm, (theta_i_deg, theta_r_deg, dphi_deg), acceptance, rings)[0]
 
@@ -149,10 +150,10 @@ def averaged_brdf(
 ) -> FloatArray:
     """BRDF in 1/sr as the rig measures it, of the angles' shape (degrees, `theta_r_deg` signed).
 
-    The mean radiance over lens and patch, over the patch's mean irradiance: what comes out when
-    a perfect white tile is measured in the sample's place, so that a Lambertian BRDF comes back
-    as it is. The patch is averaged over `patch_nodes` x `patch_nodes` Gauss-Legendre points.
-    Raises `ValueError` where no light falls on the patch.
+    Mean radiance over lens and patch, divided by the patch's mean irradiance, as measured with an
+    ideal white tile in the sample's place: a Lambertian BRDF is not changed. The patch is averaged
+    over `patch_nodes` x `patch_nodes` Gauss-Legendre points. Raises `ValueError` where no light
+    falls on the patch.
     """
     points, weights = acceptance.patch(patch_nodes)
     angles = (theta_i_deg, theta_r_deg, dphi_deg)
@@ -161,13 +162,13 @@ def averaged_brdf(
     if np.any(light <= 0):
         dark = np.broadcast_to(np.asarray(theta_i_deg, dtype=np.float64), light.shape)[light <= 0]
         raise ValueError(
-            f"no light that the camera could see falls on the patch at theta_i = "
+            f"no light visible to the camera falls on the patch at theta_i = "
             f"{dark.flat[0]:g} degrees; allowed: angles with lamp and lens above the horizon"
         )
     return np.asarray(sample @ weights / light)
 
 
-def rings_each(
+def required_rings(
     brdf: Brdf,
     theta_i_deg: ArrayLike,
     theta_r_deg: ArrayLike,
@@ -175,17 +176,16 @@ def rings_each(
     acceptance: Acceptance,
     *,
     tolerance: ArrayLike = 1e-4,
-    most: int = MOST_RINGS,
+    most: int = MAX_RINGS,
 ) -> IntArray:
-    """The smallest number of rings, geometry by geometry, that one more changes too little.
+    """Number of rings that each geometry needs, of the angles' shape (degrees).
 
-    Too little is a change of the averaged BRDF by less than `tolerance`, relative, which
-    broadcasts against the angles. Judged at the patch's centre, since the patch is small beside
-    lamp and lens. Gives `most` where that many are still not enough, as at a sharp kink of a
-    model. Integers of the angles' shape.
+    The smallest number at which one more ring changes the averaged BRDF by no more than
+    `tolerance`, relative, which broadcasts against the angles. Tested at the patch's centre, since
+    the patch is small compared with lamp and lens. Returns `most` where that is still not enough,
+    as at a sharp kink of a model.
     """
-    given = (theta_i_deg, theta_r_deg, dphi_deg, tolerance)
-    arrays = np.broadcast_arrays(*map(_floats, given))
+    arrays = _broadcast(theta_i_deg, theta_r_deg, dphi_deg, tolerance)
     rows = np.stack([a.ravel() for a in arrays])
     rings = np.full(rows.shape[1], most)
     todo = np.arange(rings.size)
@@ -201,8 +201,8 @@ def rings_each(
     return rings.reshape(arrays[0].shape)
 
 
-def _floats(value: ArrayLike) -> FloatArray:
-    return np.asarray(value, dtype=np.float64)
+def _broadcast(*values: ArrayLike) -> tuple[FloatArray, ...]:
+    return np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in values))
 
 
 def _radiance(
@@ -213,8 +213,8 @@ def _radiance(
     rings: int,
 ) -> tuple[FloatArray, FloatArray]:
     """Radiance of the sample, and of a BRDF of 1 in its place; angles' shape + points' shape."""
-    theta_i, theta_r, dphi = np.broadcast_arrays(*map(_floats, angles))
-    points = _floats(points_mm)
+    theta_i, theta_r, dphi = _broadcast(*angles)
+    points = np.asarray(points_mm, dtype=np.float64)
     shape = theta_i.shape + points.shape[:-1]
     geometry, point = np.divmod(np.arange(int(np.prod(shape))), max(1, points[..., 0].size))
     places = points.reshape(-1, 3)
@@ -233,33 +233,33 @@ def _block(
 ) -> tuple[FloatArray, FloatArray]:
     """As `_radiance` for pairs of one point, (Q, 3), and one geometry, (Q,) each."""
     theta_i_deg, theta_r_deg, dphi_deg = angles
-    # Lens and lamp are turned against each other and against the scan's plane: their nodes then
-    # meet a kink of the BRDF at many different angles instead of a few times at the same.
-    lens = _disc(
+    # The nodes of lens and lamp are rotated against each other and against the scan's plane, so
+    # that they sample a kink of the BRDF at many different angles.
+    lens = _disc_nodes(
         camera_direction(theta_r_deg),
         camera_direction(theta_r_deg + 90.0),
         acceptance.beam_length_mm,
         acceptance.receiver_solid_angle_sr,
         disc_rule(rings, 0.25),
     )
-    lamp = _disc(
+    lamp = _disc_nodes(
         lamp_direction(theta_i_deg, dphi_deg),
         lamp_direction(theta_i_deg + 90.0, dphi_deg),
         acceptance.lamp_distance_mm,
         acceptance.source_solid_angle_sr,
         disc_rule(rings, 0.5),
     )
-    theta_r, phi_r, seen = _seen_from(points, lens, disc_rule(rings)[1])
-    theta_i, phi_i, lit = _seen_from(points, lamp, disc_rule(rings)[1])
+    theta_r, phi_r, seen = _directions_from(points, lens, disc_rule(rings)[1])
+    theta_i, phi_i, lit = _directions_from(points, lamp, disc_rule(rings)[1])
     total = seen.sum(axis=-1, keepdims=True)
     seen = np.divide(seen, total, out=np.zeros_like(seen), where=total > 0)
     lit = lit / _normal_irradiance(acceptance, rings)
-    values = brdf(_pairs(theta_i, theta_r, phi_i, phi_r))
+    values = brdf(_node_pairs(theta_i, theta_r, phi_i, phi_r))
     sample = np.einsum("qk,qk->q", lit, np.matmul(values, seen[:, :, np.newaxis])[:, :, 0])
     return sample, lit.sum(axis=-1) * seen.sum(axis=-1)
 
 
-def _disc(
+def _disc_nodes(
     direction: FloatArray,
     tangent: FloatArray,
     distance: float,
@@ -272,13 +272,13 @@ def _disc(
     return np.asarray(distance * direction[:, np.newaxis, :] + radius * (rule[0] @ across))
 
 
-def _seen_from(
+def _directions_from(
     points: FloatArray, nodes: FloatArray, weights: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Polar angle and azimuth in degrees, and weight cos / r^2, of nodes (Q, M) from (Q, 3).
 
-    A node at or below the horizon has weight 0 and stands at the zenith, so that the BRDF is
-    never asked for an angle that it does not have.
+    A node at or below the horizon has weight 0 and the direction of the zenith, at which any BRDF
+    is defined.
     """
     to = nodes - points[:, np.newaxis, :]
     r2 = np.einsum("qmi,qmi->qm", to, to)
@@ -292,19 +292,19 @@ def _seen_from(
 
 @lru_cache(maxsize=64)
 def _normal_irradiance(acceptance: Acceptance, rings: int) -> float:
-    """Irradiance at the origin of the lamp at the zenith, in the units of `_seen_from`."""
+    """Irradiance at the origin by the lamp at the zenith, in the units of `_directions_from`."""
     zenith = np.array([[0.0, 0.0, 1.0]])
-    lamp = _disc(
+    lamp = _disc_nodes(
         zenith,
         np.array([[1.0, 0.0, 0.0]]),
         acceptance.lamp_distance_mm,
         acceptance.source_solid_angle_sr,
         disc_rule(rings),
     )
-    return float(_seen_from(np.zeros((1, 3)), lamp, disc_rule(rings)[1])[2].sum())
+    return float(_directions_from(np.zeros((1, 3)), lamp, disc_rule(rings)[1])[2].sum())
 
 
-def _pairs(
+def _node_pairs(
     theta_i: FloatArray, theta_r: FloatArray, phi_i: FloatArray, phi_r: FloatArray
 ) -> Geometry:
     """Geometry (Q, K, M) of every lamp node (Q, K) with every lens node (Q, M)."""

@@ -1,8 +1,7 @@
-"""Covariance of the measured points: independent errors and those that points share.
+"""Covariance of the measured points: independent errors, and errors that points share.
 
-C = diag(variance) + common common^T, each column of `common` being one error that several points
-share: how far one standard deviation of it shifts each of them (GUM, and Cox and Harris,
-generalised least squares).
+C = diag(variance) + common common^T. Each column of `common` is one shared error: the shift of
+every point by one standard deviation of it (GUM; generalised least squares as in Cox and Harris).
 """
 
 from __future__ import annotations
@@ -20,8 +19,8 @@ from instrument.geometry import BoolArray, Brdf, FloatArray, Geometry, IntArray
 LAMP_LEVEL = "lamp level"
 Columns = FloatArray | csr_array
 
-_MOST_FULL = 100_000  # entries of a full array; of more, few are not 0
-_ANY_LEVEL = 1.0  # relative u of a level that is not known at all
+_MAX_DENSE = 100_000  # entries of a dense array; larger ones are mostly zeros, so sparse
+_U_UNKNOWN_LEVEL = 1.0  # relative u of a lamp level of which nothing is known
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,15 +28,15 @@ class Covariance:
     """C = diag(variance) + common common^T of N points with K shared errors.
 
     variance: (N,), independent variances, positive, in the square of the data's unit.
-    common: (N, K), standard shifts by each shared error, in the data's unit; sparse for a long
-        scan, of which a full array would fill the memory.
-    names: what each shared error is, in words; empty where nobody has named them.
+    common: (N, K), shifts by one u of each shared error, in the data's unit; sparse for a long
+        scan, whose dense array would fill the memory.
+    names: name of each shared error, for messages; empty where they have none.
     """
 
     variance: FloatArray
     common: Columns
     names: tuple[str, ...] = ()
-    _own: Columns = field(init=False, repr=False)
+    _whitened: Columns = field(init=False, repr=False)
     _vectors: FloatArray = field(init=False, repr=False)
     _shrink: FloatArray = field(init=False, repr=False)
 
@@ -47,51 +46,54 @@ class Covariance:
                 f"variance = {self.variance.min():g}; allowed: finite, more than 0 for every point"
             )
         # In units of the independent errors C is 1 + V V^T, and with V^T V = W diag(s) W^T its
-        # inverse root is 1 - V W diag((1 - 1 / sqrt(1 + s)) / s) W^T V^T. The same chi2 as from
-        # a Cholesky factor of C, at the cost of K^3 and without a matrix of N x N.
+        # inverse root is 1 - V W diag((1 - 1 / sqrt(1 + s)) / s) W^T V^T. This gives the chi2 of
+        # a Cholesky factor of C at a cost of K^3, without an N x N matrix.
         V = _scaled(self.common, 1 / np.sqrt(self.variance))
         s, W = np.linalg.eigh(_product(V.T, V))
         root = np.sqrt(1 + np.maximum(s, 0.0))
-        object.__setattr__(self, "_own", V)
+        object.__setattr__(self, "_whitened", V)
         object.__setattr__(self, "_vectors", W)
         object.__setattr__(self, "_shrink", 1 / (root * (1 + root)))
 
     def whiten(self, x: FloatArray) -> FloatArray:
-        """C^(-1/2) x for x of shape (N,) or (N, M): residuals become independent with u = 1."""
-        scale = np.sqrt(self.variance)
-        return self._unshared(x / (scale if x.ndim == 1 else scale[:, np.newaxis]))
+        """C^(-1/2) x for x of shape (N,) or (N, M), in the data's unit.
 
-    def _unshared(self, y: FloatArray) -> FloatArray:
+        The result, of the same shape, is in units of u: residuals become independent with u = 1.
+        """
+        scale = np.sqrt(self.variance)
+        return self._whiten_shared(x / (scale if x.ndim == 1 else scale[:, np.newaxis]))
+
+    def _whiten_shared(self, y: FloatArray) -> FloatArray:
         """(1 + V V^T)^(-1/2) y, of y in units of the independent errors."""
         if self.common.shape[1] == 0:
             return np.asarray(y)
-        inner = self._vectors.T @ (self._own.T @ y)
+        inner = self._vectors.T @ (self._whitened.T @ y)
         shrink = self._shrink if y.ndim == 1 else self._shrink[:, np.newaxis]
-        return np.asarray(y - self._own @ (self._vectors @ (shrink * inner)))
+        return np.asarray(y - self._whitened @ (self._vectors @ (shrink * inner)))
 
     def pulls(self, residual: FloatArray) -> FloatArray:
-        """The likeliest value of each shared error behind a residual (N,), in units of its u, (K,).
+        """Most likely value (K,) of each shared error, in units of its u, given a residual (N,).
 
         The mean of the errors' normal distribution given the residual: common^T C^-1 residual.
         """
-        return np.asarray(self._own.T @ self._unshared(self.whiten(residual)))
+        return np.asarray(self._whitened.T @ self._whiten_shared(self.whiten(residual)))
 
-    def of(self, points: BoolArray) -> Covariance:
-        """Covariance of some of the points (N,)."""
+    def subset(self, points: BoolArray) -> Covariance:
+        """Covariance of the points marked True in `points` (N,)."""
         return Covariance(self.variance[points], self.common[points], self.names)
 
     @property
     def u_total(self) -> FloatArray:
-        """Standard uncertainty of each point, (N,): the root of C's diagonal."""
+        """Standard uncertainty (N,) of each point, in the data's unit: root of C's diagonal."""
         return np.asarray(np.sqrt(self.variance + (self.common * self.common).sum(axis=1)))
 
     @property
     def u_independent(self) -> FloatArray:
-        """The part of it that no other point shares, (N,)."""
+        """Independent part (N,) of each point's standard uncertainty, in the data's unit."""
         return np.sqrt(self.variance)
 
     def matrix(self) -> FloatArray:
-        """C in full, (N, N)."""
+        """C as a dense array (N, N), in the square of the data's unit."""
         return np.asarray(np.diag(self.variance) + _product(self.common, self.common.T))
 
 
@@ -102,38 +104,36 @@ def _scaled(columns: Columns, by: FloatArray) -> Columns:
     return columns.multiply(by[:, np.newaxis]).tocsr()
 
 
-def with_column(columns: Columns, column: FloatArray) -> Columns:
-    """One shared error (N,) more."""
+def append_column(columns: Columns, column: FloatArray) -> Columns:
+    """Append a column (N,) to columns (N, K), in the same unit, dense or sparse."""
     if isinstance(columns, np.ndarray):
         return np.column_stack([columns, column])
     return csr_array(hstack([columns, csr_array(column[:, np.newaxis])]))
 
 
 def _product(left: Any, right: Any) -> FloatArray:
-    """The matrix product in full, of full or sparse arrays (scipy's types do not mix them)."""
+    """Dense matrix product of dense or sparse arrays (scipy's types do not mix them)."""
     product = left @ right
     return np.asarray(product if isinstance(product, np.ndarray) else product.toarray(), np.float64)
 
 
-def independent(measurements: Measurements) -> Covariance:
-    """Covariance of `u_random` alone; where that is not stated, of 1 for every point."""
+def independent_covariance(measurements: Measurements) -> Covariance:
+    """Covariance of `u_random` alone; where that is not stated, 1 for every point."""
     u = measurements.u_random
     variance = np.ones(measurements.size) if u is None else np.square(u)
     return Covariance(variance, np.zeros((measurements.size, 0)))
 
 
-def shared(
-    measurements: Measurements,
-    smooth: Brdf,
-    own: Brdf | None = None,
+def full_covariance(
+    measurements: Measurements, smooth: Brdf, own: Brdf | None = None
 ) -> Covariance:
-    """Covariance of all stated uncertainties, around models near the data (BRDF in 1/sr).
+    """Covariance of all stated uncertainties, linearised about models near the data.
 
-    `smooth`, the best model so far, turns the error of theta_r, which a stage repeats at every
-    return to an angle, into one of the BRDF: the same for every model that is fitted. `own`
-    (default `smooth`) is the model that is being fitted: it turns the other shared errors into
-    shifts. With another model's shifts, a large enough error of the tile would pass for the
-    structure in which the two models differ.
+    `smooth` and `own` return BRDF in 1/sr, of the geometry's shape. `smooth`, the best model so
+    far, converts the error of theta_r, which a stage repeats at every return to an angle, into one
+    of the BRDF: the same for every model that is compared. `own` (default `smooth`) is the model
+    being fitted; it converts the other shared errors. With another model's shifts, a large error
+    of the tile could pass for the difference between the two models.
 
     Relative errors are multiplied with a model and not with the data: scaled by noisy data, a
     common relative error pulls the fit towards the low points (Peelle's pertinent puzzle).
@@ -149,35 +149,35 @@ def shared(
         {"dphi": m.u_dphi_deg},
     )
     groups: list[tuple[str, FloatArray, IntArray | FloatArray]] = [
-        ("theta_r", change(m, smooth, **view), m.theta_r_deg),
-        ("theta_i, lamp setting", change(m, own, **incidence), m.lamp_setting),
-        ("dphi, lamp setting", change(m, own, **azimuth), m.lamp_setting),
+        ("theta_r", angle_sensitivity(m, smooth, **view), m.theta_r_deg),
+        ("theta_i, lamp setting", angle_sensitivity(m, own, **incidence), m.lamp_setting),
+        ("dphi, lamp setting", angle_sensitivity(m, own, **azimuth), m.lamp_setting),
         *((error.name, f * error.u_relative, error.group) for error in m.shared),
     ]
     if m.free_levels:
-        groups.append((LAMP_LEVEL, _ANY_LEVEL * f, m.lamp_setting))
-    bends = [_second_order_u(m, smooth, **angle) for angle in (view, incidence, azimuth)]
-    variance = np.square(m.u_random) + np.sum(np.square(bends), axis=0)
+        groups.append((LAMP_LEVEL, _U_UNKNOWN_LEVEL * f, m.lamp_setting))
+    second_order = [_second_order_u(m, smooth, **angle) for angle in (view, incidence, azimuth)]
+    variance = np.square(m.u_random) + np.sum(np.square(second_order), axis=0)
     columns, names = [], []
     for name, shift, group in groups:
-        alone, several, labels = _columns(shift, group)
-        variance = variance + np.square(alone)
+        single, several, labels = _columns(shift, group)
+        variance = variance + np.square(single)
         columns.append(several)
         names += [f"{name}{label}" for label in labels]
     common = csr_array(hstack(columns))
-    few = common.shape[0] * common.shape[1] <= _MOST_FULL
-    return Covariance(variance, common.toarray() if few else common, _numbered(names))
+    dense = common.shape[0] * common.shape[1] <= _MAX_DENSE
+    return Covariance(variance, common.toarray() if dense else common, _numbered(names))
 
 
 def _columns(
     shift: FloatArray, group: IntArray | FloatArray
 ) -> tuple[FloatArray, csc_array, list[str]]:
-    """Shifts (N,) of points that share theirs with none; a column and a label a larger group.
+    """Shifts (N,) of points that are alone in their group; column and label of each larger group.
 
     The points of a group have the same number in `group`, or the same angle in degrees.
     """
     values, member, count = np.unique(group, return_inverse=True, return_counts=True)
-    alone = count[member] == 1
+    single = count[member] == 1
     several = np.flatnonzero((count > 1) & (np.bincount(member, np.abs(shift)) > 0))
     column = np.full(values.size, -1)
     column[several] = np.arange(several.size)
@@ -185,43 +185,44 @@ def _columns(
     places = (rows, column[member[rows]])
     columns = csc_array((shift[rows], places), shape=(shift.size, several.size))
     if np.issubdtype(group.dtype, np.floating):
-        labels = [f" at {value:g} degrees" for value in values[several]]
+        labels = [f" at {value:g}°" for value in values[several]]
     else:
         labels = [f" {value + 1}" if values.size > 1 else "" for value in values[several]]
-    return np.where(alone, shift, 0.0), columns, labels
+    return np.where(single, shift, 0.0), columns, labels
 
 
 def _numbered(names: list[str]) -> tuple[str, ...]:
-    """Names that stand several times get a number each."""
-    seen: dict[str, int] = {}
-    apart, often = [], Counter(names)
+    """Names made unique: those that occur several times get a number each."""
+    total, so_far = Counter(names), Counter[str]()
+    unique = []
     for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        apart.append(name if often[name] == 1 else f"{name} {seen[name]}")
-    return tuple(apart)
+        so_far[name] += 1
+        unique.append(name if total[name] == 1 else f"{name} {so_far[name]}")
+    return tuple(unique)
 
 
-def change(m: Measurements, smooth: Brdf, **angle: float) -> FloatArray:
-    """Half the change of the model from -u to +u of an angle (degrees), (N,): (df/dx) u.
+def angle_sensitivity(m: Measurements, smooth: Brdf, **u_angle: float) -> FloatArray:
+    """Shift (N,) of `smooth` in 1/sr by one u of an angle: half its change from -u to +u.
 
-    Steps of u itself, so that a kink counts as far as u reaches over it. Beyond 90 degrees there
-    is no geometry: there the change on the other side counts alone.
+    `u_angle` is one of theta_i, theta_r and dphi, in degrees; `smooth` gives BRDF of the geometry's
+    shape. Steps of u itself include a kink as far as u reaches over it. Beyond 90 degrees there is
+    no geometry: the change on the other side then counts alone.
     """
-    if not any(angle.values()):
+    if not any(u_angle.values()):
         return np.zeros(m.size)
-    up, up_step = _moved(m, 1, **angle)
-    down, down_step = _moved(m, -1, **angle)
+    up, up_step = _moved(m, 1, **u_angle)
+    down, down_step = _moved(m, -1, **u_angle)
     return np.asarray((smooth(up) - smooth(down)) / (up_step + down_step))
 
 
-def _second_order_u(m: Measurements, smooth: Brdf, **angle: float) -> FloatArray:
-    """What a straight line leaves of an angle's error, (N,): its u by the next term of the series.
+def _second_order_u(m: Measurements, smooth: Brdf, **u_angle: float) -> FloatArray:
+    """Second-order contribution (N,) of an angle's uncertainty (GUM 5.1.2, note).
 
-    A normal error of u adds (d2f/dx2) u^2 / 2 times a square of mean square 3 (GUM, 5.1.2, note).
+    A normal error of u adds (d2f/dx2) u^2 / 2 times a square of mean square 3.
     """
-    if not any(angle.values()):
+    if not any(u_angle.values()):
         return np.zeros(m.size)
-    (up, up_step), (down, down_step) = _moved(m, 1, **angle), _moved(m, -1, **angle)
+    (up, up_step), (down, down_step) = _moved(m, 1, **u_angle), _moved(m, -1, **u_angle)
     both = up_step * down_step  # beyond 90 degrees there is no second side to compare with
     return np.asarray(both * np.sqrt(3) * (smooth(up) + smooth(down) - 2 * smooth(m.geometry)) / 2)
 
@@ -229,11 +230,11 @@ def _second_order_u(m: Measurements, smooth: Brdf, **angle: float) -> FloatArray
 def _moved(
     m: Measurements, sign: int, *, theta_i: float = 0.0, theta_r: float = 0.0, dphi: float = 0.0
 ) -> tuple[Geometry, FloatArray]:
-    """Geometry with the angles moved, and 1 where that could be done, 0 where not."""
+    """Geometry with the angles moved, and (N,): 1 where that is possible, 0 elsewhere."""
     new_i, new_r = m.theta_i_deg + sign * theta_i, m.theta_r_deg + sign * theta_r
     inside = (np.abs(new_i) <= 90) & (np.abs(new_r) <= 90)
     new_i, new_r = np.where(inside, new_i, m.theta_i_deg), np.where(inside, new_r, m.theta_r_deg)
-    # A lamp that passes the normal stands on the other side: dphi turns by 180.
+    # A lamp that passes the normal is on the other side: dphi changes by 180.
     new_dphi = m.dphi_deg + sign * dphi + np.where(new_i < 0, 180.0, 0.0)
     moved = Geometry.from_degrees(theta_i=np.abs(new_i), theta_r=new_r, dphi=new_dphi)
     return moved, inside.astype(np.float64)

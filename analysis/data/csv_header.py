@@ -1,4 +1,4 @@
-"""The header of a CSV of measurements: which columns are read, where, and what they may hold."""
+"""Header of a CSV table of measurements: the columns that are read, and their allowed values."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from analysis.data.csv_line import QuoteError, fields_of
-from analysis.data.text_file import TextFile, error_of, number
+from analysis.data.text_file import TextFile, input_error, parse_number
 from instrument.errors import InputError
 from instrument.text.quoting import printable
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column that is read: its unit, and what its numbers may be, in words and as limits."""
+    """A column that is read: unit, and allowed values, in words and as limits."""
 
     name: str
     unit: str
@@ -23,10 +23,10 @@ class Column:
     low: float = -math.inf
     high: float = math.inf
 
-    def value(self, text: str) -> float:
-        """Raises `ValueError`, which says what is wrong and what is allowed."""
+    def parse(self, text: str) -> float:
+        """Parse a number in the column's unit; `ValueError` states the problem and the limits."""
         try:
-            value = number(text)
+            value = parse_number(text)
         except ValueError as error:
             raise ValueError(f"{error}; allowed: {self.allowed}{_hint(text)}") from None
         if not self.low <= value <= self.high:
@@ -34,7 +34,7 @@ class Column:
         return value
 
 
-# Far beyond any measurement; squares and ratios of what lies within can still be computed.
+# Far beyond any measurement, but squares and ratios of such values do not overflow.
 BRDF = Column("brdf", "1/sr", "-1e15 to 1e15 1/sr", -1e15, 1e15)
 U_BRDF = Column("u_brdf", "1/sr", "1e-15 to 1e15 1/sr", 1e-15, 1e15)
 NEEDED = (
@@ -54,17 +54,17 @@ _DECIMAL_COMMA = re.compile(r"([-+]?[0-9]+),([0-9]+)")
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """Number of the header's line, how many columns it has, and at which index each one is."""
+    """Line number of the header, number of its columns, and index of each column by name."""
 
     line: int
     width: int
-    places: dict[str, int]
+    indices: dict[str, int]
 
 
 def read_header(file: TextFile, rows: Iterator[tuple[int, str]]) -> Header:
-    """Read the first of the file's rows; columns that are missing or double are noted there.
+    """Read the header, the first of the file's rows; missing and duplicate columns are noted.
 
-    Raises `InputError` if there is no row, or its fields cannot be told apart.
+    Raises `InputError` if there is no row, or its fields cannot be separated.
     """
     line, text = next(rows, (0, ""))
     if line == 0:
@@ -83,20 +83,20 @@ def read_header(file: TextFile, rows: Iterator[tuple[int, str]]) -> Header:
         what += ", and a point in decimal numbers"
         raise _refused(file, line, text.index(separator) + 1, what)
     _check_names(file, line, names, [start for start, _ in fields])
-    places = {c.name: names.index(c.name) for c in COLUMNS if c.name in names}
-    return Header(line, len(names), places)
+    indices = {c.name: names.index(c.name) for c in COLUMNS if c.name in names}
+    return Header(line, len(names), indices)
 
 
 def _refused(file: TextFile, line: int, column: int, text: str) -> InputError:
     file.note(line, column, text)
-    return error_of(file)
+    return input_error(file)
 
 
 def _other_separator(text: str, names: list[str]) -> str | None:
-    """What separates the names instead of commas; None if commas do, or nothing known."""
+    """Separator of the names other than the comma; None if it is the comma, or not known."""
     needed = {column.name for column in NEEDED}
     for separator in () if needed & set(names) else _SEPARATORS:
-        # One name alone may be a word of a title.
+        # A single name may be a word in a title.
         if len(needed & {name.strip(' "') for name in text.split(separator)}) > 1:
             return separator
     return None
@@ -111,10 +111,11 @@ def _check_names(file: TextFile, line: int, names: list[str], starts: list[int])
             what = f"{column.name}: the column is missing; found: {found}; allowed: {HEADER}"
             file.note(line, 1, what)
         for place in places[1:]:
-            what = f"{column.name}: the column stands twice, first at column {places[0]}"
+            what = f"{column.name}: duplicate column, first at column {places[0]}"
             file.note(line, place, f"{what}; keep one of them")
 
 
 def _hint(text: str) -> str:
+    """Correction of a decimal comma."""
     found = _DECIMAL_COMMA.fullmatch(text.strip())
     return f" (write {found[1]}.{found[2]})" if found else ""

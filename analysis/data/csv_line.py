@@ -1,6 +1,6 @@
-"""One line of a CSV: its fields, in quotes or without, and the column at which each begins.
+"""Fields of one CSV line, quoted or not, with the column at which each begins.
 
-The standard library's reader does not say where a field stands, which every message needs.
+The standard library's reader does not give the position of a field, which every message needs.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ _QUOTED = re.compile(r'[ \t]*"((?:[^"]|"")*+)"[ \t]*(?=,|\Z)')
 
 
 class QuoteError(Exception):
-    """A quote does not end with its field; `column` is where the field begins, from 1."""
+    """A quote is not closed at the end of its field; `column` of the field counts from 1."""
 
     def __init__(self, column: int, text: str) -> None:
-        what = f"{shown(text)}: the quote is not closed before the next comma or the line's end"
+        what = f"{shown(text)}: the quote is not closed before the next comma or the end of line"
         super().__init__(f'{what}; allowed: text in quotes, with "" for a quote inside it')
         self.column = column
 
 
 def texts_of(line: str) -> list[str]:
-    """The fields' texts, without their quotes. Raises `QuoteError`."""
+    """Texts of the fields, without quotes. Raises `QuoteError`."""
     return [text for _, text in fields_of(line)] if '"' in line else line.split(",")
 
 
 def fields_of(line: str) -> Iterator[tuple[int, str]]:
-    """Column, from 1, of the first character that is no space, and text of each field.
+    """Column (from 1) of the first non-blank character, and text, of each field.
 
     Raises `QuoteError` on reaching a field whose quote is not closed.
     """
@@ -45,7 +45,7 @@ def fields_of(line: str) -> Iterator[tuple[int, str]]:
 
 
 def _unquoted(line: str, start: int, raw: str) -> tuple[str, str]:
-    """A field as it stands in the line, from the index `start`, and its text; raw: to a comma."""
+    """A field with its quotes, and its text; `raw` is the line from `start` to the next comma."""
     quoted = _QUOTED.match(line, start)
     if quoted is not None:
         return quoted[0], quoted[1].replace('""', '"')
@@ -56,5 +56,5 @@ def _unquoted(line: str, start: int, raw: str) -> tuple[str, str]:
 
 
 def column_of(line: str, index: int) -> int:
-    """Column, from 1, of one field of a line that was read before."""
+    """Column (from 1) of the field at an index, in a line that was read before."""
     return next(islice(fields_of(line), index, None))[0]

@@ -1,16 +1,16 @@
-"""Measurements in a CSV table: one row a geometry, columns found by their name in the header.
+"""CSV reader for measurements: one row per geometry, columns identified by the header.
 
 ::
 
     theta_i_deg,theta_r_deg,dphi_deg,brdf,u_brdf     any order; further columns are ignored
     30.0,-20.0,0.0,0.231,0.002                       u_brdf may be left out, but as a whole
 
-Angles are those of `instrument/geometry.py`: theta_r_deg may be signed, and its sign is kept.
-Blank lines and lines that begin with # are skipped; a field in quotes may hold commas, but no
-line end. Negative values of brdf are data: noise about zero.
+Angles are those of `instrument/geometry.py`: theta_r_deg may be signed, and keeps its sign.
+Blank lines and lines that begin with # are skipped. A quoted field may contain commas, but no line
+end. Negative values of brdf are data: noise about zero.
 
-A run's measurements.csv is such a table. Its `flags` are ignored like any further column, so
-flagged rows are read too: the run's folder is the better source of a run.
+The measurements.csv of a run is such a table. Its `flags` are ignored like any further column, so
+flagged rows are read too; to leave them out, read the run's folder instead.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ import numpy as np
 from analysis.data.csv_header import BRDF, COLUMNS, ROWS, U_BRDF, Column, Header, read_header
 from analysis.data.csv_line import QuoteError, column_of, texts_of
 from analysis.data.measurements import Measurements
-from analysis.data.text_file import TextFile, error_of, read_text
+from analysis.data.text_file import TextFile, input_error, read_text
 
 
 def read_csv(path: Path) -> Measurements:
     """Read a table of N rows; `u_random` is None if u_brdf is absent, or empty in every row.
 
-    A row whose three angles, as numbers, stand in an earlier row is a mistake. The same direction
-    by other angles (theta_r = 0 at two dphi; -20, 0 and 20, 180) is another setting of the lamp,
-    which a scan with several dphi holds, and is read.
-    Raises `InputError` with every mistake in the file, the first 20 of them in words.
+    A row with the same three angles as an earlier one is a mistake. The same direction given by
+    other angles (theta_r = 0 at two dphi; -20, 0 and 20, 180) is another setting of the lamp, as
+    in a scan with several dphi, and is read.
+    Raises `InputError` with every mistake in the file; the first 20 are listed.
     """
     file = read_text(path, pipe=True)
     rows = file.rows()
     table = _Table(file, read_header(file, rows))
     for line, text in rows:
-        table.take(line, text)
+        table.add(line, text)
     table.finish()
     if file.mistakes:
-        raise error_of(file)
+        raise input_error(file)
     return table.measurements()
 
 
@@ -50,18 +50,19 @@ def read_csv(path: Path) -> Measurements:
 class _Table:
     """The rows below a header.
 
-    `rows` holds a value for each of COLUMNS, NaN where none could be read; `seen` the line of
-    every geometry; `blank` the lines in which a field is empty that may be empty in every row.
+    rows: a value for each of COLUMNS, NaN where none could be read.
+    first_lines: line of the first row with each geometry.
+    blank: lines in which a column is empty that may be empty in every row.
     """
 
     file: TextFile
     header: Header
     rows: list[list[float]] = field(default_factory=list)
-    seen: dict[tuple[float, ...], int] = field(default_factory=dict)
+    first_lines: dict[tuple[float, ...], int] = field(default_factory=dict)
     blank: dict[str, list[int]] = field(default_factory=lambda: {"brdf": [], "u_brdf": []})
 
-    def take(self, line: int, text: str) -> None:
-        """Read a row, or note what is wrong with it."""
+    def add(self, line: int, text: str) -> None:
+        """Read a row, or note its mistakes."""
         try:
             fields = texts_of(text)
         except QuoteError as error:
@@ -73,9 +74,9 @@ class _Table:
         row = [self._value(line, column, fields) for column in COLUMNS]
         self.rows.append(row)
         angles = (row[0], row[1], row[2])
-        first = self.seen.setdefault(angles, line)
+        first = self.first_lines.setdefault(angles, line)
         if first != line and not math.isnan(sum(angles)):
-            what = f"the same three angles stand already in line {first}"
+            what = f"the same three angles as in line {first}"
             self._note(line, "theta_i_deg", f"{what}; allowed: each geometry once")
 
     def _note_width(self, line: int, text: str, width: int) -> None:
@@ -89,24 +90,24 @@ class _Table:
             self.file.note(line, column_of(text, self.header.width), what + hint)
 
     def _value(self, line: int, column: Column, fields: list[str]) -> float:
-        if column.name not in self.header.places:
+        if column.name not in self.header.indices:
             return math.nan
-        text = fields[self.header.places[column.name]]
+        text = fields[self.header.indices[column.name]]
         if column.name in self.blank and not text.strip():
             self.blank[column.name].append(line)
             return math.nan
         try:
-            return column.value(text)
+            return column.parse(text)
         except ValueError as error:
             self._note(line, column.name, str(error))
             return math.nan
 
     def _note(self, line: int, name: str, what: str) -> None:
-        start = column_of(self.file.lines[line - 1], self.header.places[name])
+        start = column_of(self.file.lines[line - 1], self.header.indices[name])
         self.file.note(line, start, f"{name}: {what}")
 
     def finish(self) -> None:
-        """Note what only the whole table shows."""
+        """Note mistakes of the table as a whole."""
         if not self.rows:
             if not self.file.mistakes:
                 what = f"header: no row follows; allowed: {ROWS}"
@@ -125,6 +126,6 @@ class _Table:
                 self._note(line, column.name, what)
 
     def measurements(self) -> Measurements:
-        """All rows, in the order of the file; they must be free of mistakes."""
+        """All rows in the order of the file, which must be free of mistakes."""
         theta_i, theta_r, dphi, brdf, u = np.array(self.rows).T
         return Measurements.bare(theta_i, theta_r, dphi, brdf, None if np.isnan(u).any() else u)

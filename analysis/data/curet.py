@@ -1,12 +1,12 @@
-"""The CUReT tables: measured BRDFs of real materials, each in the same directions.
+"""Reader for the CUReT database: measured BRDFs of 61 real materials in the same 205 directions.
 
-A folder with two text files, as the Columbia-Utrecht database publishes them:
+A folder has two text files, as published by Columbia and Utrecht universities:
 
 - `table.txt`: a row `n theta_v phi_v theta_i phi_i` for each direction, in radians, n = 1, 2, ...;
   v is the camera's direction, i the lamp's, so that dphi = phi_v - phi_i.
 - `abrdf.dat`: a row `sample v1 v2 ...` for each material: its BRDF in 1/sr in each direction.
 
-No uncertainty comes with them. Some values are negative or zero: artefacts of the measurement,
+No uncertainties are published. Some values are negative or zero: artefacts of the measurement,
 which are masked and counted.
 
 Source: K. J. Dana, B. van Ginneken, S. K. Nayar, J. J. Koenderink, "Reflectance and Texture of
@@ -25,7 +25,7 @@ import numpy as np
 
 from analysis.data.csv_header import BRDF
 from analysis.data.measurements import Measurements
-from analysis.data.text_file import TextFile, error_of, number, read_text
+from analysis.data.text_file import TextFile, input_error, parse_number, read_text
 from instrument.errors import InputError
 from instrument.geometry import FloatArray
 from instrument.text.quoting import printable, shown
@@ -33,7 +33,7 @@ from instrument.text.quoting import printable, shown
 TABLE, VALUES = "table.txt", "abrdf.dat"
 
 _ANGLES = ("theta_v", "phi_v", "theta_i", "phi_i")
-# The last printed digit of an angle: 90 degrees may stand there as 1.570797 rad.
+# Last printed digit of an angle: 90 degrees may be printed as 1.570797 rad.
 _ROUNDING_RAD = 1e-6
 _ROW = "a row `sample v1 v2 ...` for each material"
 _WHOLE = re.compile(r"[0-9]{1,9}")
@@ -41,12 +41,12 @@ _WHOLE = re.compile(r"[0-9]{1,9}")
 
 @dataclass(frozen=True, slots=True)
 class Curet:
-    """One material of the database, and what was left out of its `measurements`.
+    """One material of the database, and the numbers of directions left out.
 
-    measurements: the positive values in the asked directions; no uncertainty is stated.
-    negative, zero: how many values in the asked directions are masked because they are so.
-    beyond: how many directions have an angle past the asked limit.
-    directions: how many directions the table has; all of the above add up to it.
+    measurements: the positive values in the requested directions; no uncertainty is stated.
+    negative, zero: numbers of negative and of zero values in the requested directions, masked.
+    beyond: number of directions with an angle above the requested limit.
+    directions: number of directions in the table, the sum of all these.
     """
 
     measurements: Measurements
@@ -59,7 +59,7 @@ class Curet:
 def read_curet(folder: Path, sample: int, max_theta_deg: float = 90.0) -> Curet:
     """Read one material, in the directions with both angles at most `max_theta_deg` degrees.
 
-    Angles are compared to within 1e-6 rad, the last digit that the table prints.
+    Angles are compared to within 1e-6 rad, the last printed digit of the table.
     Raises `InputError` with every mistake in the direction table, the sample numbers and the
     sample's values; for a `max_theta_deg` that is not more than 0 and at most 90; and if no
     positive value is left.
@@ -71,7 +71,7 @@ def read_curet(folder: Path, sample: int, max_theta_deg: float = 90.0) -> Curet:
     directions_rad = _directions(table)
     brdf = _values(values, sample, len(directions_rad))
     if table.mistakes or values.mistakes:
-        raise error_of(table, values)
+        raise input_error(table, values)
     curet = _curet(np.array(directions_rad), np.array(brdf), max_theta_deg)
     if curet.measurements.size == 0:
         what = f"sample {sample} has no positive value with both angles at most {max_theta_deg:g}"
@@ -97,12 +97,12 @@ def _files(folder: Path) -> tuple[TextFile, TextFile]:
 
 
 def _curet(directions_rad: FloatArray, brdf: FloatArray, max_theta_deg: float) -> Curet:
-    """Mask what was not asked for, or is not positive; directions (N, 4) as in the table."""
+    """Mask values not requested or not positive; directions (N, 4) as in the table."""
     theta_v, phi_v, theta_i, phi_i = np.degrees(directions_rad).T
     rounding_deg = math.degrees(_ROUNDING_RAD)
     asked = np.maximum(theta_v, theta_i) <= max_theta_deg + rounding_deg
     used = asked & (brdf > 0)
-    # Rounding alone takes an angle past 90 degrees: _angle refuses every other one.
+    # Only rounding puts an angle above 90 degrees: _angle refuses every other one.
     theta_v, theta_i = np.minimum(theta_v, 90.0), np.minimum(theta_i, 90.0)
     return Curet(
         Measurements.bare(theta_i[used], theta_v[used], (phi_v - phi_i)[used], brdf[used]),
@@ -114,7 +114,7 @@ def _curet(directions_rad: FloatArray, brdf: FloatArray, max_theta_deg: float) -
 
 
 def _directions(file: TextFile) -> list[list[float]]:
-    """Angles `theta_v, phi_v, theta_i, phi_i` in radians of each row, with mistakes noted."""
+    """Angles `theta_v, phi_v, theta_i, phi_i` of each row in radians; mistakes are noted."""
     directions: list[list[float]] = []
     for n, (line, text) in enumerate(file.rows(), start=1):
         fields = _fields(text)
@@ -134,12 +134,12 @@ def _directions(file: TextFile) -> list[list[float]]:
 
 
 def _angle(file: TextFile, line: int, name: str, field: tuple[int, str]) -> float:
-    """An angle in radians, NaN with its mistake noted if it is none."""
+    """An angle in radians; NaN, with a mistake noted, for text that is not a number."""
     column, text = field
     theta = name.startswith("theta")
     allowed = "a number from 0 to 1.570796 rad" if theta else "a number from -1e6 to 1e6 rad"
     try:
-        angle = number(text)
+        angle = parse_number(text)
     except ValueError as error:
         file.note(line, column, f"{name}: {error}; allowed: {allowed}")
         return math.nan
@@ -150,15 +150,15 @@ def _angle(file: TextFile, line: int, name: str, field: tuple[int, str]) -> floa
 
 
 def _values(file: TextFile, sample: int, directions: int) -> list[float]:
-    """The sample's values in 1/sr, with mistakes noted: in them, and in all sample numbers."""
+    """Values of a sample in 1/sr; mistakes in them, and in all sample numbers, are noted."""
     lines: dict[int, int] = {}
     for line, text in file.rows():
         column, first = _fields(text)[0]
         if not _WHOLE.fullmatch(first):
-            what = f"sample: {shown(first)} is no whole number; allowed: the sample's number"
+            what = f"sample: {shown(first)} is not a whole number; allowed: the sample's number"
             file.note(line, column, what)
         elif lines.setdefault(int(first), line) != line:
-            what = f"sample: {first} stands already in line {lines[int(first)]}"
+            what = f"sample: {first} is already in line {lines[int(first)]}"
             file.note(line, column, f"{what}; allowed: each sample once")
     if sample in lines:
         return _row(file, lines[sample], directions)
@@ -168,7 +168,7 @@ def _values(file: TextFile, sample: int, directions: int) -> list[float]:
 
 
 def _row(file: TextFile, line: int, directions: int) -> list[float]:
-    """The values of one sample's row, with mistakes noted."""
+    """Values of one sample's row; mistakes are noted."""
     text = file.lines[line - 1]
     fields = _fields(text)
     if directions and len(fields) != 1 + directions:
@@ -177,7 +177,7 @@ def _row(file: TextFile, line: int, directions: int) -> list[float]:
     values = []
     for n, (column, value) in enumerate(fields[1:], start=1):
         try:
-            values.append(BRDF.value(value))
+            values.append(BRDF.parse(value))
         except ValueError as error:
             file.note(line, column, f"v{n}: {error}")
     return values
@@ -193,12 +193,12 @@ def _count(fields: list[tuple[int, str]]) -> str:
 
 
 def _place(text: str, fields: list[tuple[int, str]], allowed: int) -> int:
-    """Where a row ends too early, or the first field that it has too many."""
+    """Column of the end of a short row, or of the first field too many."""
     return fields[allowed][0] if len(fields) > allowed else len(text.rstrip()) + 1
 
 
 def _ranges(numbers: Collection[int]) -> str:
-    """Whole numbers in their order, as `1-3, 7`."""
+    """Whole numbers in order, as `1-3, 7`."""
     known = set(numbers)
     starts = sorted(n for n in known if n - 1 not in known)
     ends = sorted(n for n in known if n + 1 not in known)

@@ -1,8 +1,8 @@
-"""What was measured: angles, BRDF, and where each part of its uncertainty comes from.
+"""Measurements: angles, BRDF, and the sources of its uncertainty.
 
-Errors differ in what they share: noise strikes every point by itself, a lamp's angle is set once
-for many points, a white tile is measured once for many, and its certificate holds for all. Fits
-need to know which is which.
+Points share errors to different degrees: noise is independent, a lamp's angle is set once for many
+points, a white tile is measured once for many, and its certificate applies to all. Fits need to
+know which points share an error.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ _ARRAYS = ("theta_i_deg", "theta_r_deg", "dphi_deg", "brdf", "u_random", "lamp_s
 
 @dataclass(frozen=True, slots=True)
 class SharedError:
-    """An error that points share: all points of one number in `group` (N,) have the same one.
+    """Error that points share: all points with the same number in `group` (N,) have the same one.
 
-    u_relative: (N,), what one standard deviation of it changes each point by, relative to its
-    value and signed; 0 for points that do not have it.
+    u_relative: (N,), signed change of each point by one standard deviation of the error, relative
+    to its value; 0 for points that do not have it.
     """
 
     name: str
     u_relative: FloatArray
     group: IntArray
 
-    def of(self, points: BoolArray) -> SharedError:
-        """The same error of some of the points (N,)."""
+    def subset(self, points: BoolArray) -> SharedError:
+        """The same error for the points marked True in `points` (N,)."""
         return SharedError(self.name, self.u_relative[points], self.group[points])
 
     @classmethod
-    def of_all(cls, name: str, u_relative: float, size: int) -> SharedError:
-        """An error that all of `size` points share alike."""
+    def common_to_all(cls, name: str, u_relative: float, size: int) -> SharedError:
+        """Error that all of `size` points share, with the same relative u."""
         return cls(name, np.full(size, u_relative), np.zeros(size, dtype=np.int64))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Measurements:
     """Measured BRDF and the parts of its standard uncertainty; arrays have the shape (N,).
 
@@ -48,12 +48,12 @@ class Measurements:
     brdf: in 1/sr.
     u_random: in 1/sr, noise, quantisation and drift, independent from point to point; None: not
         stated, then every other uncertainty must be 0.
-    lamp_setting: points of one number share one setting of theta_i and dphi, and its errors.
-    shared: further errors that points share, as those of a white tile or of the dark.
-    u_theta_i_deg, u_theta_r_deg, u_dphi_deg: of the angles, in degrees; points of the same
+    lamp_setting: points with the same number share one setting of theta_i and dphi, and its errors.
+    shared: further shared errors, such as those of a white tile or of the dark frames.
+    u_theta_i_deg, u_theta_r_deg, u_dphi_deg: of the angles, in degrees; points with the same
         theta_r share its error.
-    relative: `brdf` and `u_random` are a radiance in a unit of its own, tied to no reference.
-    free_levels: how bright the lamp is at each of its settings is not known.
+    relative: `brdf` and `u_random` are radiance in a unit of its own, without a reference.
+    free_levels: the lamp's brightness at each of its settings is unknown.
 
     Raises `ValueError` for shapes that differ, values that are not finite, angles outside their
     domain, a `u_random` that is not positive, or a negative uncertainty of an angle.
@@ -108,43 +108,43 @@ class Measurements:
         brdf: ArrayLike,
         u_brdf: ArrayLike | None = None,
     ) -> Measurements:
-        """Measurements of which only the angles, the BRDF and perhaps its u (1/sr) are known.
+        """Measurements without shared errors: angles in degrees, BRDF and perhaps its u in 1/sr.
 
         Arguments broadcast to the shape (N,). Points with the same theta_i and dphi count as one
-        setting of the lamp; there are no shared errors.
+        setting of the lamp.
         """
         parts = [theta_i_deg, theta_r_deg, dphi_deg, brdf, 0.0 if u_brdf is None else u_brdf]
         arrays = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in parts))
         theta_i, theta_r, dphi, value, u = (a.reshape(-1).copy() for a in arrays)
         return cls(
-            theta_i,
-            theta_r,
-            dphi,
-            value,
-            None if u_brdf is None else u,
-            lamp_setting=same_setting(theta_i, dphi),
+            theta_i_deg=theta_i,
+            theta_r_deg=theta_r,
+            dphi_deg=dphi,
+            brdf=value,
+            u_random=None if u_brdf is None else u,
+            lamp_setting=setting_numbers(theta_i, dphi),
         )
 
-    def of(self, points: BoolArray) -> Measurements:
-        """Some of the points (N,), with the errors that they share."""
+    def subset(self, points: BoolArray) -> Measurements:
+        """The points marked True in `points` (N,), with their shared errors."""
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         chosen = {name: array[points] for name, array in arrays.items() if array is not None}
-        return replace(self, **chosen, shared=tuple(error.of(points) for error in self.shared))
+        return replace(self, **chosen, shared=tuple(error.subset(points) for error in self.shared))
 
     @property
     def geometry(self) -> Geometry:
-        """The points' geometry."""
+        """Geometry (N,) of the points, from their angles in degrees."""
         return Geometry.from_degrees(
             theta_i=self.theta_i_deg, theta_r=self.theta_r_deg, dphi=self.dphi_deg
         )
 
     @property
     def size(self) -> int:
-        """How many points there are."""
+        """Number of points."""
         return int(self.brdf.size)
 
 
-def same_setting(theta_i_deg: FloatArray, dphi_deg: FloatArray) -> IntArray:
-    """A number for each point, (N,): the same for the same theta_i and dphi."""
+def setting_numbers(theta_i_deg: FloatArray, dphi_deg: FloatArray) -> IntArray:
+    """Number of each point's lamp setting (N,): equal for equal theta_i and dphi (N,), degrees."""
     pairs = np.stack([theta_i_deg, dphi_deg], axis=-1)
     return np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Sweeps of a scan: points of one incidence in one plane, by rising view angle."""
+"""Sweeps of a scan: the points of one incidence in one plane, ordered by view angle."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 from analysis.data.measurements import Measurements
 from instrument.geometry import FloatArray, IntArray
 
-_DECIMALS = 3  # degrees that agree to this many are one setting
+_DECIMALS = 3  # degrees equal to this many decimals are one setting
 
 
 class Sweep(NamedTuple):
-    """theta_i and dphi (0 to below 180) in degrees, and the points' places by rising theta_r."""
+    """theta_i and dphi (0 to below 180) in degrees, and the points' indices by rising theta_r."""
 
     theta_i_deg: float
     dphi_deg: float
@@ -21,8 +21,8 @@ class Sweep(NamedTuple):
 
 
 def sweeps(m: Measurements) -> list[Sweep]:
-    """All sweeps of two points and more, by incidence and plane."""
-    plane, views = in_plane(m)
+    """All sweeps of at least two points, by incidence and plane."""
+    plane, views = plane_and_view(m)
     settings = np.stack([np.round(m.theta_i_deg, _DECIMALS), plane], axis=1)
     values, member = np.unique(settings, axis=0, return_inverse=True)
     found = []
@@ -34,13 +34,13 @@ def sweeps(m: Measurements) -> list[Sweep]:
     return found
 
 
-def in_plane(m: Measurements) -> tuple[FloatArray, FloatArray]:
-    """dphi in degrees, 0 to below 180, and theta_r with the sign that it has in that plane."""
+def plane_and_view(m: Measurements) -> tuple[FloatArray, FloatArray]:
+    """dphi (N,), folded to 0 to below 180 degrees, and theta_r (N,) signed in that plane."""
     azimuth = np.mod(np.round(m.dphi_deg, _DECIMALS), 360.0)
     over = azimuth >= 180.0
     return np.where(over, azimuth - 180.0, azimuth), np.where(over, -m.theta_r_deg, m.theta_r_deg)
 
 
 def signed_view(m: Measurements) -> FloatArray:
-    """theta_r in degrees, (N,), positive on the side of its plane's dphi below 180 degrees."""
-    return in_plane(m)[1]
+    """theta_r (N,) in degrees, positive on the side of its plane where dphi is below 180."""
+    return plane_and_view(m)[1]

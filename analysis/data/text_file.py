@@ -1,7 +1,7 @@
-"""Text files of measurements: their lines, the numbers in them, and the place of every mistake.
+"""Text files of measurements: reading lines and numbers, and collecting mistakes by position.
 
-Mistakes are noted as they are found and raised together, `file:line:column: what stands there;
-what is allowed`; lines and columns count from 1, columns in characters.
+Mistakes are noted as they are found and raised together, as `file:line:column: what was found; what
+is allowed`. Lines and columns count from 1, columns in characters.
 """
 
 from __future__ import annotations
@@ -15,36 +15,36 @@ from instrument.errors import InputError
 from instrument.text.atomic_file import read_file
 from instrument.text.quoting import printable, shown
 
-MAX_BYTES = 64 * 1024**2  # some 400 000 rows of a run's measurements.csv
+MAX_BYTES = 64 * 1024**2  # about 400 000 rows of a run's measurements.csv
 MAX_LINES = 2_000_000
-MAX_LINE = 1024**2  # characters; a thousand columns need some 20 000
+MAX_LINE = 1024**2  # characters; a thousand columns need about 20 000
 MAX_REPORTED = 20
-MAX_NOTED = 10_000  # what is all wrong need not be read to its end
+MAX_NOTED = 10_000  # with more mistakes the rest of the file is not read
 
 
 @dataclass(slots=True)
 class TextFile:
-    """A file's name and lines, the first of them line 1, and what is wrong with them so far."""
+    """Name and lines of a file, and the mistakes found so far: line, column and text."""
 
     name: str
     lines: list[str]
     mistakes: list[tuple[int, int, str]] = field(default_factory=list)
 
     def rows(self) -> Iterator[tuple[int, str]]:
-        """Number and text of every line that is neither blank nor begins with #."""
+        """Number and text of every line that is not blank and does not begin with #."""
         for line, text in enumerate(self.lines, start=1):
             if text.strip() and not text.startswith("#"):
                 yield line, text
 
     def note(self, line: int, column: int, text: str) -> None:
-        """Note a mistake; raises `InputError` with those so far when there are MAX_NOTED."""
+        """Note a mistake; raises `InputError` with all so far when there are MAX_NOTED."""
         self.mistakes.append((line, column, text))
         if len(self.mistakes) >= MAX_NOTED:
-            raise error_of(self)
+            raise input_error(self)
 
 
-def error_of(*files: TextFile) -> InputError:
-    """The error that lists the mistakes of all files by place, the first MAX_REPORTED of them."""
+def input_error(*files: TextFile) -> InputError:
+    """Error that lists the mistakes of all files by position, at most MAX_REPORTED of them."""
     lines = [
         f"{file.name}:{line}:{column}: {text}"
         for file in files
@@ -59,8 +59,8 @@ def error_of(*files: TextFile) -> InputError:
 def read_text(path: Path, *, pipe: bool = False) -> TextFile:
     """Read a UTF-8 file (with or without a byte order mark, lines ending in LF, CRLF or CR).
 
-    `pipe`: it may be a pipe. Raises `InputError` for a file that cannot be opened, that is not
-    UTF-8 text, or that is larger than MAX_BYTES, MAX_LINES or MAX_LINE.
+    `pipe` allows a pipe. Raises `InputError` for a file that cannot be opened, is not UTF-8 text,
+    or exceeds MAX_BYTES, MAX_LINES or MAX_LINE.
     """
     name = printable(str(path))
     raw = _bytes(path, name, pipe).removeprefix(b"\xef\xbb\xbf")
@@ -74,14 +74,14 @@ def read_text(path: Path, *, pipe: bool = False) -> TextFile:
         file = TextFile(name, before)
         byte = f"byte 0x{raw[error.start]:02x} is not UTF-8 text"
         file.note(len(before), len(before[-1]) + 1, f"{byte}; save the file as UTF-8")
-        raise error_of(file) from None
+        raise input_error(file) from None
 
 
 def _with_short_lines(file: TextFile) -> TextFile:
     for line, text in enumerate(file.lines, start=1):
         if len(text) > MAX_LINE:
             file.note(line, 1, f"a line of {len(text)} characters; allowed: {MAX_LINE}")
-            raise error_of(file)
+            raise input_error(file)
     return file
 
 
@@ -103,20 +103,20 @@ def _bytes(path: Path, name: str, pipe: bool) -> bytes:
 
 
 def _lines(raw: bytes) -> list[str]:
-    # str.splitlines would also break lines at form feeds and the like, which editors do not count.
+    # str.splitlines would also split at form feeds and the like, which editors do not count.
     return raw.decode().replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
-def number(text: str) -> float:
-    """A finite number as Python writes it, without underscores.
+def parse_number(text: str) -> float:
+    """Parse a finite number in Python's notation, without underscores.
 
-    Raises `ValueError`, whose text says what stands there instead.
+    Raises `ValueError` with a description of the text found instead.
     """
     text = text.strip()
     if not text:
         raise ValueError("is empty")
     try:
-        value = float(text.replace("_", "?"))  # Python itself would take 1_000
+        value = float(text.replace("_", "?"))  # Python itself accepts 1_000
     except ValueError:
         raise ValueError(f"{shown(text)} is text") from None
     if not math.isfinite(value):

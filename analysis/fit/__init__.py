@@ -1,1 +1,1 @@
-"""analysis/fit."""
+"""Fit of one reflectance model to measurements, with uncertainties. Open `fit.py` first."""

@@ -1,7 +1,7 @@
-"""Fits to what the rig averages over, without averaging at every step of the search.
+"""Fit of a model averaged over the rig's acceptance, without averaging at every search step.
 
-The averaged model is written as gain * model + offset, both found at the parameters of the last
-round; the search runs with them fixed; then they are found anew, until that changes nothing.
+The averaged model is written as gain * model + offset, both computed at the parameters of the last
+round. The search runs with them fixed, then they are computed anew, until they no longer change.
 """
 
 from __future__ import annotations
@@ -10,88 +10,89 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.data.acceptance import Acceptance, averaged_brdf, rings_each
+from analysis.data.acceptance import Acceptance, averaged_brdf, required_rings
 from analysis.data.measurements import Measurements
 from analysis.fit.levenberg_marquardt import Minimum
 from analysis.fit.problem import Problem
 from instrument.geometry import FloatArray, Geometry, IntArray
 
-MOST_ROUNDS = 12
+MAX_ROUNDS = 12
 
-# All in units of the points' independent uncertainty: what averaging must change to be worth it,
-# what a round may still change, and what one more ring of the quadrature may change.
-WORTH, SETTLED, _RING = 1 / 3, 0.05, 0.2
+# All in units of the points' independent uncertainty: the least effect of averaging that counts,
+# the change at which the rounds have converged, and the tolerance of the quadrature.
+RELEVANT, CONVERGED, _QUADRATURE = 1 / 3, 0.05, 0.2
 
-# Beyond these ratios a gain would magnify errors of a nearly vanishing model: then an offset.
-_LEAST_GAIN, _MOST_GAIN = 0.1, 5.0
+# Outside these ratios a gain would magnify errors of a nearly vanishing model: then an offset.
+_MIN_GAIN, _MAX_GAIN = 0.1, 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class Averaged:
-    """A solution, its problem, whether averaging was worth it, and whether its rounds settled."""
+class AveragedFit:
+    """A solution and its problem; flags: the model was averaged, and the rounds converged."""
 
     problem: Problem
     solution: Minimum
-    used: bool
-    settled: bool
+    averaged: bool
+    converged: bool
 
 
-def average(
+def fit_averaged(
     problem: Problem,
     solution: Minimum,
     measurements: Measurements,
     acceptance: Acceptance,
     u: FloatArray,
-) -> Averaged:
-    """Fit again with the model averaged over the rig's acceptance, where that is worth it.
+) -> AveragedFit:
+    """Refit with the model averaged over the acceptance, where that changes it by more than u/3.
 
-    `solution` is the fit without averaging, `u` (N,) in 1/sr what counts as a change.
+    `solution` is the fit without averaging, `u` (N,) the independent uncertainty in 1/sr.
     """
     rings = _rings(problem, solution.x, measurements, acceptance, u)
     mean = _mean(problem, solution.x, measurements, acceptance, rings)
-    if np.all(np.abs(mean - problem.plain(solution.x)) <= WORTH * u):
-        return Averaged(problem, solution, False, True)
-    settled = False
-    for _ in range(MOST_ROUNDS):
+    if np.all(np.abs(mean - problem.model_brdf(solution.x)) <= RELEVANT * u):
+        return AveragedFit(problem, solution, averaged=False, converged=True)
+    converged = False
+    for _ in range(MAX_ROUNDS):
         problem = _corrected(problem, solution.x, mean)
         solution = problem.solve(solution.x)
         rings = np.maximum(rings, _rings(problem, solution.x, measurements, acceptance, u))
         mean = _mean(problem, solution.x, measurements, acceptance, rings)
-        settled = bool(np.all(np.abs(mean - problem.predict(solution.x)) < SETTLED * u))
-        if settled:
+        converged = bool(np.all(np.abs(mean - problem.predict(solution.x)) < CONVERGED * u))
+        if converged:
             break
-    return Averaged(problem, solution, True, settled)
+    return AveragedFit(problem, solution, averaged=True, converged=converged)
 
 
 def _corrected(problem: Problem, x: FloatArray, mean: FloatArray) -> Problem:
-    plain = problem.plain(x)
-    gentle = (mean * plain > 0) & (np.abs(mean) < _MOST_GAIN * np.abs(plain))
-    gentle &= np.abs(mean) > _LEAST_GAIN * np.abs(plain)
-    gain = np.divide(mean, plain, out=np.ones_like(mean), where=gentle)
-    return replace(problem, gain=gain, offset=np.where(gentle, 0.0, mean - plain))
+    """The problem with gain and offset that turn the model at x into its mean (N,)."""
+    model = problem.model_brdf(x)
+    moderate = (mean * model > 0) & (np.abs(mean) < _MAX_GAIN * np.abs(model))
+    moderate &= np.abs(mean) > _MIN_GAIN * np.abs(model)
+    gain = np.divide(mean, model, out=np.ones_like(mean), where=moderate)
+    return replace(problem, gain=gain, offset=np.where(moderate, 0.0, mean - model))
 
 
 def _rings(
     problem: Problem, x: FloatArray, m: Measurements, acceptance: Acceptance, u: FloatArray
 ) -> IntArray:
-    size = np.maximum(np.abs(problem.plain(x)), u)
-    return rings_each(
-        lambda geometry: problem.plain(x, geometry),
+    size = np.maximum(np.abs(problem.model_brdf(x)), u)
+    return required_rings(
+        lambda geometry: problem.model_brdf(x, geometry),
         m.theta_i_deg,
         m.theta_r_deg,
         m.dphi_deg,
         acceptance,
-        tolerance=_RING * u / size,
+        tolerance=_QUADRATURE * u / size,
     )
 
 
 def _mean(
     problem: Problem, x: FloatArray, m: Measurements, acceptance: Acceptance, rings: IntArray
 ) -> FloatArray:
-    """The averaged model, (N,), each point with its own number of rings."""
+    """The averaged model (N,), each point with its own number of rings."""
 
     def brdf(geometry: Geometry) -> FloatArray:
-        return problem.plain(x, geometry)
+        return problem.model_brdf(x, geometry)
 
     mean = np.empty(m.size)
     for n in np.unique(rings):

@@ -1,6 +1,6 @@
-"""How likely a fit is: chi2's probability, the criteria of Schwarz and Akaike, the noise.
+"""Statistical criteria of a fit: probability of its chi2, BIC, AICc, and the noise of the data.
 
-Where no u is stated, the noise is one more thing that the residuals have to tell.
+Where no u is stated, the variance of the noise is estimated from the residuals.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from analysis.fit.levenberg_marquardt import Minimum, weights
 from analysis.fit.problem import Problem
 from instrument.geometry import FloatArray
 
-# No camera tells more: smaller residuals, relative to the mean BRDF, are rounding of the search.
+# Below what any camera resolves: smaller residuals, relative to the mean BRDF, are rounding.
 LEAST_NOISE = 1e-5
-# A model whose chi2 is less probable than this does not explain the data.
-UNLIKELY = 1e-3
-# Of 10 000 normal residuals one is beyond so many u: a robust fit sets such points aside.
-NOT_NORMAL = 4.0
+# Level of all tests of significance: less probable deviations are not taken for chance.
+SIGNIFICANCE = 1e-3
+# One of 10 000 normal residuals is larger, in units of u: a robust fit sets such points aside.
+OUTLIER_U = 4.0
 
 
 def probability(chi2: float, dof: int) -> float:
-    """Of a chi2 as large as this or larger, if the model and all stated u are right."""
+    """Probability of a chi2 at least this large if the model and all stated u are right."""
     return float(chdtrc(float(dof), chi2)) if dof > 0 else 1.0
 
 
 def explained(problem: Problem, found: Minimum, m: Measurements) -> bool:
-    """Whether a fit leaves nothing to explain: no more than the stated u, or than rounding."""
+    """True if the fit converged to within the stated u, or to rounding where none is stated."""
     if m.u_random is None:
-        return found.converged and found.chi2 <= m.size * floor(problem)
-    return found.converged and probability(found.chi2, m.size - found.x.size) > UNLIKELY
+        return found.converged and found.chi2 <= m.size * variance_floor(problem)
+    return found.converged and probability(found.chi2, m.size - found.x.size) > SIGNIFICANCE
 
 
 def bic(m: Measurements, problem: Problem, found: Minimum) -> float:
@@ -41,30 +41,30 @@ def bic(m: Measurements, problem: Problem, found: Minimum) -> float:
 
 
 def _deviance(m: Measurements, problem: Problem, chi2: float) -> float:
-    """-2 ln of the likelihood but for a constant: chi2, or N ln(rss / N) where no u is stated."""
+    """-2 ln(likelihood) but for a constant: chi2, or N ln(rss / N) where no u is stated."""
     if m.u_random is not None:
         return chi2
     rss = chi2 * float(np.mean(problem.covariance.variance))
-    return m.size * math.log(max(rss / m.size, floor(problem)))
+    return m.size * math.log(max(rss / m.size, variance_floor(problem)))
 
 
 def aicc(m: Measurements, problem: Problem, found: Minimum) -> float:
-    """Akaike's criterion with Hurvich and Tsai's (1989) term for few points."""
-    k = found.x.size + (m.u_random is None)  # the noise is a parameter too where it is estimated
+    """Akaike's criterion with Hurvich and Tsai's (1989) correction for few points."""
+    k = found.x.size + (m.u_random is None)  # an estimated noise is one more parameter
     spare = m.size - k - 1
     penalty = 2 * k * m.size / spare if spare > 0 else math.inf
     return _deviance(m, problem, found.chi2) + penalty
 
 
-def floor(problem: Problem) -> float:
-    """The least variance of a point, in 1/sr squared, that a fit may find."""
+def variance_floor(problem: Problem) -> float:
+    """Least variance of a point, in 1/sr^2, that a fit may estimate."""
     return max((LEAST_NOISE * float(np.mean(np.abs(problem.brdf)))) ** 2, 1e-300)
 
 
 def noise_variance(m: Measurements, problem: Problem, solution: Minimum) -> float:
     """Variance of the whitened residuals: 1 where u is stated, else estimated from them.
 
-    A robust fit's is larger by what counting large residuals less costs.
+    That of a robust fit is larger, because large residuals have less weight.
     """
     spare = m.size - solution.x.size
     if problem.huber is not None and spare > 0:
@@ -72,20 +72,21 @@ def noise_variance(m: Measurements, problem: Problem, solution: Minimum) -> floa
         return _robust_variance(r, problem.huber, None if m.u_random is not None else spare)
     if m.u_random is not None:
         return 1.0
-    return max(solution.chi2 / spare, floor(problem))
+    return max(solution.chi2 / spare, variance_floor(problem))
 
 
 def _robust_variance(r: FloatArray, limit: float, spare: int | None) -> float:
-    """Mean of psi^2 over the squared mean of its slope (Huber 1981, section 7.6).
+    """Mean of psi^2 over the squared mean of its derivative (Huber 1981, section 7.6).
 
-    From the residuals, for the `spare` degrees of freedom; with None from the normal distribution,
-    for the u is stated, and from the share of the residuals that are none of it.
+    Estimated from the residuals with `spare` degrees of freedom. Where u is stated (None), taken
+    from the normal distribution, mixed with the fraction of outliers among the residuals.
     """
     if spare is not None:
         psi2 = float(np.sum(np.square(r * weights(r, limit)))) / spare
         return psi2 / max(float(np.mean(np.abs(r) <= limit)), 0.5) ** 2
-    wild = float(np.mean(np.abs(r) > NOT_NORMAL))
+    outliers = float(np.mean(np.abs(r) > OUTLIER_U))
     inside = math.erf(limit / math.sqrt(2))
     density = math.exp(-(limit**2) / 2) / math.sqrt(2 * math.pi)
     psi2 = inside - 2 * limit * density + limit**2 * (1 - inside)
-    return ((1 - wild) * psi2 + wild * limit**2) / max((1 - wild) * inside, 0.5) ** 2
+    weighted = (1 - outliers) * psi2 + outliers * limit**2
+    return weighted / max((1 - outliers) * inside, 0.5) ** 2

@@ -1,4 +1,4 @@
-"""A first fit: the basin of the minimum, with the independent uncertainties alone."""
+"""First fit of a model, with the independent uncertainties alone: finds the deepest minimum."""
 
 from __future__ import annotations
 
@@ -6,33 +6,31 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.data.covariance import independent
+from analysis.data.covariance import independent_covariance
 from analysis.data.measurements import Measurements
-from analysis.fit.criteria import bic, explained, floor
+from analysis.fit.criteria import bic, explained, variance_floor
 from analysis.fit.levenberg_marquardt import HUBER, Minimum
 from analysis.fit.problem import Problem
-from analysis.fit.relative_scale import NAME as RELATIVE_FACTOR
-from analysis.fit.relative_scale import relative
-from analysis.fit.starting_values import starts
+from analysis.fit.relative_scale import FACTOR_NAME, relative_model
+from analysis.fit.starting_values import starting_values
 from analysis.models import Model
 from instrument.errors import NotDetermined
 from instrument.geometry import FloatArray, Geometry
 
-# Starts that are tried where the first one's minimum does not explain the data.
-_MOST_STARTS = 3
-# A quick fit ends with a step that lowers chi2 by this part of it.
-_NEAR = 1e-4
-# Rounds in which a robust fit and its estimate of the noise settle.
+# Starting values, the best included, that are tried where the best does not explain the data.
+_MAX_STARTS = 3
+_QUICK_RTOL = 1e-4
+# Iterations in which a robust fit and its estimate of the noise converge.
 _ROBUST_ROUNDS = 3
-# Of normal errors, standard deviation over median of the absolute value.
-_PER_MEDIAN = 1.4826
+# Standard deviation of normal errors over the median of their absolute values.
+_SIGMA_PER_MEDIAN = 1.4826
 
 
 @dataclass(frozen=True, slots=True)
 class FirstFit:
-    """A model fitted with the independent uncertainties alone, without averaging.
+    """Model fitted with the independent uncertainties alone, without averaging.
 
-    untried: starts in other basins.
+    untried: starting values, (K,) each, near other local minima.
     """
 
     problem: Problem
@@ -41,35 +39,35 @@ class FirstFit:
     untried: tuple[FloatArray, ...] = ()
 
     def brdf(self, geometry: Geometry) -> FloatArray:
-        """The fitted model in any geometry, in 1/sr."""
-        return self.problem.plain(self.solution.x, geometry)
+        """BRDF of the fitted model in 1/sr, of the shape of the geometry."""
+        return self.problem.model_brdf(self.solution.x, geometry)
 
 
 def first_fit(model: Model, measurements: Measurements, robust: bool = False) -> FirstFit:
-    """The deepest minimum with independent uncertainties. Raises `NotDetermined` as `fit` does."""
+    """Find the deepest minimum with independent uncertainties. Raises `NotDetermined` as `fit`."""
     return multi_start(quick_fit(model, measurements), measurements, robust)
 
 
 def quick_fit(model: Model, measurements: Measurements) -> FirstFit:
-    """About the minimum from the best start alone. Raises `NotDetermined` as `fit` does.
+    """Fit roughly, from the best starting value alone. Raises `NotDetermined` as `fit` does.
 
-    Where measurements are relative, the model has one more parameter: see
-    `analysis.fit.relative_scale`.
+    For relative measurements the model has one more parameter: see `analysis.fit.relative_scale`.
     """
     if measurements.relative:
-        model = relative(model, measurements.brdf)
+        model = relative_model(model, measurements.brdf)
     _require_points(model, measurements)
-    problem = Problem(model, measurements.geometry, measurements.brdf, independent(measurements))
-    first, *others = starts(problem, _MOST_STARTS)
-    solution = problem.solve(first, settled=_NEAR)
+    covariance = independent_covariance(measurements)
+    problem = Problem(model, measurements.geometry, measurements.brdf, covariance)
+    first, *others = starting_values(problem, _MAX_STARTS)
+    solution = problem.solve(first, rtol=_QUICK_RTOL)
     return FirstFit(problem, solution, bic(measurements, problem, solution), tuple(others))
 
 
 def multi_start(quick: FirstFit, m: Measurements, robust: bool = False) -> FirstFit:
-    """The fit where it explains the data; else the deepest of all basins that have a start."""
+    """Complete a quick fit; unless it explains the data, keep the deepest minimum of all starts."""
     problem, best = quick.problem, quick.solution
     if problem.huber is not None:
-        return quick  # it has been through this
+        return quick  # complete already
     best = problem.solve(best.x)
     for start in quick.untried:
         if explained(problem, best, m):
@@ -81,31 +79,30 @@ def multi_start(quick: FirstFit, m: Measurements, robust: bool = False) -> First
 
 
 def _huber_refit(problem: Problem, solution: Minimum, m: Measurements) -> tuple[Problem, Minimum]:
-    """The fit with Huber's loss; where no u is stated, the residuals' median gives the noise."""
+    """Refit with Huber's loss; without stated u the median residual estimates the noise."""
     problem = replace(problem, huber=HUBER)
     for _ in range(_ROBUST_ROUNDS if m.u_random is None else 1):
         if m.u_random is None:
-            left = np.abs(problem.predict(solution.x) - problem.brdf)
-            variance = max((_PER_MEDIAN * float(np.median(left))) ** 2, floor(problem))
-            problem = replace(
-                problem, covariance=replace(problem.covariance, variance=np.full(m.size, variance))
-            )
+            size = np.abs(problem.predict(solution.x) - problem.brdf)
+            sigma = _SIGMA_PER_MEDIAN * float(np.median(size))
+            variance = np.full(m.size, max(sigma**2, variance_floor(problem)))
+            problem = replace(problem, covariance=replace(problem.covariance, variance=variance))
         solution = problem.solve(solution.x)
     return problem, solution
 
 
-def determined(model: Model, measurements: Measurements) -> bool:
-    """Whether there are as many points as parameters (one more where no u is stated)."""
+def enough_points(model: Model, measurements: Measurements) -> bool:
+    """True for as many points as parameters, or more; without stated u one more is needed."""
     return measurements.size >= _points_needed(model, measurements)
 
 
 def _points_needed(model: Model, m: Measurements) -> int:
-    named = any(p.name == RELATIVE_FACTOR for p in model.parameters)
-    return len(model.parameters) + (m.u_random is None) + (m.relative and not named)
+    counted = any(p.name == FACTOR_NAME for p in model.parameters)
+    return len(model.parameters) + (m.u_random is None) + (m.relative and not counted)
 
 
 def _require_points(model: Model, measurements: Measurements) -> None:
-    if not determined(model, measurements):
+    if not enough_points(model, measurements):
         raise NotDetermined(
             f"{model.name} has {len(model.parameters)} parameters; {measurements.size} points do "
             f"not determine them; allowed: {_points_needed(model, measurements)} points or more"

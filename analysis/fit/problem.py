@@ -8,22 +8,22 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from analysis.data.covariance import Covariance
-from analysis.fit.levenberg_marquardt import SETTLED, Minimum, descend, loss
+from analysis.fit.levenberg_marquardt import RTOL, Minimum, descend, loss
 from analysis.models import Model
 from instrument.geometry import BoolArray, FloatArray, Geometry
 
-# How far off a bound that no slope leads away from a search goes on, as a part of the domain; what
-# it must lower chi2 by to count.
-_OFF_BOUND, _SAME = 1e-3, 1e-9
+# Distance by which a parameter is moved off a bound where its derivative is zero, as a fraction of
+# its domain; relative decrease of chi2 from which the search from there counts as better.
+_OFF_BOUND, _BETTER = 1e-3, 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Fit gain * model + offset to `brdf` (N,), in 1/sr, with a covariance of the points.
+    """Fit of gain * model + offset to `brdf` (N,), in 1/sr, with a covariance of the points.
 
-    `gain` (1) and `offset` (1/sr) carry what the rig's acceptance does to the model. Parameter
-    vectors `x` are in the order and the units of `model.parameters`. `huber`: residuals beyond it,
-    in units of u, count linearly; None: chi2 is the sum of squares.
+    `gain` (relative) and `offset` (1/sr), scalars or (N,), hold the effect of the rig's acceptance
+    on the model. Parameter vectors `x` (K,) are in the order and the units of `model.parameters`.
+    `huber`: residuals beyond it, in units of u, count linearly; None: chi2 is the sum of squares.
     """
 
     model: Model
@@ -40,74 +40,79 @@ class Problem:
         object.__setattr__(self, "low", np.array([p.low for p in self.model.parameters]))
         object.__setattr__(self, "high", np.array([p.high for p in self.model.parameters]))
 
-    def plain(self, x: FloatArray, geometry: Geometry | None = None) -> FloatArray:
-        """The model's BRDF in 1/sr, without gain and offset, here or in another geometry."""
+    def model_brdf(self, x: FloatArray, geometry: Geometry | None = None) -> FloatArray:
+        """BRDF of the model at x (K,), without gain and offset: in 1/sr, of the geometry's shape.
+
+        Without a `geometry`, at the points of the problem.
+        """
         names = (p.name for p in self.model.parameters)
         return self.model.kernel(
             self.geometry if geometry is None else geometry, **dict(zip(names, x, strict=True))
         )
 
     def predict(self, x: FloatArray) -> FloatArray:
-        """What the rig would measure, (N,), in 1/sr."""
-        return np.asarray(self.gain * self.plain(x) + self.offset)
+        """Values (N,) that the rig would measure, in 1/sr, at x (K,)."""
+        return np.asarray(self.gain * self.model_brdf(x) + self.offset)
 
     def residual(self, x: FloatArray) -> FloatArray:
-        """Whitened prediction minus data, (N,)."""
+        """Whitened prediction minus data (N,), in units of u, at x (K,)."""
         return self.covariance.whiten(self.predict(x) - self.brdf)
 
     def chi2(self, x: FloatArray) -> float:
-        """Sum of the squares of the whitened residuals, or their robust loss."""
+        """Sum of squares of the whitened residuals, in units of u^2, or robust loss; x is (K,)."""
         return loss(self.residual(x), self.huber)
 
     def jacobian(self, x: FloatArray, free: Sequence[int] | None = None) -> FloatArray:
-        """Whitened derivatives of the prediction by the `free` parameters (all), (N, K)."""
+        """Whitened derivatives (N, K) of the prediction at x, in u per unit of each parameter.
+
+        `free` are the indices of the parameters to derive by; None means all.
+        """
         parameters = self.model.parameters
-        slopes = self.model.gradient(
+        gradients = self.model.gradient(
             self.geometry, **{p.name: float(v) for p, v in zip(parameters, x, strict=True)}
         )
         indices = range(x.size) if free is None else free
-        columns = [self.gain * slopes[parameters[i].name] for i in indices]
+        columns = [self.gain * gradients[parameters[i].name] for i in indices]
         return self.covariance.whiten(np.stack(columns, axis=1))
 
     def solve(
-        self,
-        start: FloatArray,
-        held: Iterable[int] = (),
-        enough: float = 0.0,
-        settled: float = SETTLED,
+        self, start: FloatArray, held: Iterable[int] = (), atol: float = 0.0, rtol: float = RTOL
     ) -> Minimum:
-        """The minimum reached from `start`, with the `held` parameters left where they are.
+        """Find the minimum from `start` (K,), with the parameters of the indices `held` fixed.
 
-        A step that lowers chi2 by no more than `enough`, or the part `settled`, is the last.
-        At zero roughness a surface changes with the square of it: no slope leads away from that
-        bound, also where the way on is down. From such a bound the search goes on a little off it.
+        The search ends with a step that lowers chi2 by no more than `atol`, or the fraction `rtol`.
+        A rough surface depends on the square of its roughness: at zero roughness the derivative is
+        zero, even where larger values fit better. From such a bound the search is repeated from a
+        point a little off it.
         """
         held = frozenset(held)
         free = [i for i in range(start.size) if i not in held]
         if not free:
-            return Minimum(start, self.chi2(start), True, "nothing to vary")
-        found = self._descended(start, free, enough, settled)
-        off = self.off_level_bounds(found.x, free)
+            return Minimum(start, self.chi2(start), True, "no parameter is free")
+        found = self._descend(start, free, atol, rtol)
+        off = self.off_flat_bounds(found.x, free)
         if np.array_equal(off, found.x):
             return found
-        other = self._descended(off, free, enough, settled)
-        return other if other.chi2 < found.chi2 * (1 - _SAME) else found
+        other = self._descend(off, free, atol, rtol)
+        return other if other.chi2 < found.chi2 * (1 - _BETTER) else found
 
-    def off_level_bounds(self, x: FloatArray, free: Sequence[int]) -> FloatArray:
-        """x, but inside with free parameters that lie on a bound where nothing changes by them."""
-        ends = zip(self.model.parameters, x, strict=True)  # a scale's slope is level nowhere
+    def off_flat_bounds(self, x: FloatArray, free: Sequence[int]) -> FloatArray:
+        """Copy of x (K,) with parameters moved off a bound where their derivative is zero.
+
+        Only the parameters of the indices `free` are moved, by 1/1000 of their domain.
+        """
+        ends = zip(self.model.parameters, x, strict=True)  # a scale's derivative is nowhere zero
         on = [i for i, (p, value) in enumerate(ends) if not p.scale and value in (p.low, p.high)]
         on = [i for i in on if i in free]
         if not on:
             return x
-        level = [i for i, slope in zip(on, self.jacobian(x, on).T, strict=True) if not slope.any()]
+        flat = [i for i, column in zip(on, self.jacobian(x, on).T, strict=True) if not column.any()]
         inside, step = x.copy(), _OFF_BOUND * (self.high - self.low)
-        inside[level] = np.clip(x, self.low + step, self.high - step)[level]
+        inside[flat] = np.clip(x, self.low + step, self.high - step)[flat]
         return inside
 
-    def _descended(
-        self, start: FloatArray, free: list[int], enough: float, settled: float
-    ) -> Minimum:
+    def _descend(self, start: FloatArray, free: list[int], atol: float, rtol: float) -> Minimum:
+        """Search over the free parameters, those marked logarithmic by their logarithms."""
         by_log = np.array([self.model.parameters[i].logarithmic for i in free])
 
         def searched(x: FloatArray) -> FloatArray:
@@ -130,13 +135,13 @@ class Problem:
             searched(start),
             *ends,
             self.huber,
-            enough,
-            settled,
+            atol,
+            rtol,
         )
         return found._replace(x=full(found.x))
 
-    def of(self, points: BoolArray) -> Problem:
-        """The same problem of some of the points (N,)."""
+    def subset(self, points: BoolArray) -> Problem:
+        """The same problem for the points marked True in `points` (N,)."""
         geometry = Geometry(
             self.geometry.theta_i_deg[points],
             self.geometry.theta_r_deg[points],
@@ -147,7 +152,7 @@ class Problem:
             self,
             geometry=geometry,
             brdf=self.brdf[points],
-            covariance=self.covariance.of(points),
+            covariance=self.covariance.subset(points),
             gain=gain,
             offset=offset,
         )

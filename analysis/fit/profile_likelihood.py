@@ -1,7 +1,8 @@
-"""Where a parameter may lie: its profile-likelihood interval.
+"""Profile-likelihood interval of one fitted parameter.
 
-The interval holds every value at which the other parameters, fitted anew, keep chi2 within `rise`
-of its minimum: 3.84, the 95 % point of chi2 with one degree of freedom, gives 95 % (Wilks 1938).
+The interval holds every value at which chi2, minimised over the other parameters, stays within
+`rise` of its minimum: 3.84, the 95 % point of chi2 with one degree of freedom, gives 95 % (Wilks
+1938).
 """
 
 from __future__ import annotations
@@ -19,11 +20,12 @@ from instrument.geometry import FloatArray
 
 RISE_95 = 3.84
 
-# The search for an end begins no nearer than this part of the domain, widens by this factor, and
-# stops at this part of the distance; the other parameters' chi2 is known to this part of `rise`.
-_NEAREST, _WIDEN, _RELATIVE, _SETTLED = 1e-9, 3.0, 0.01, 1e-3
-# What a shape changes over its whole domain counts as nothing below this part of what is allowed.
-_UNSEEN = 0.01
+# The search for an end starts at least this fraction of the domain away, grows by this factor, and
+# ends at this fraction of the distance; chi2 of the other parameters is known to this part of rise.
+_MIN_STEP, _GROWTH, _RTOL, _CHI2_TOLERANCE = 1e-9, 3.0, 0.01, 1e-3
+# A shape parameter has no effect where it changes the data, over its whole domain, by less than
+# this fraction of the allowed change.
+_NO_EFFECT = 0.01
 
 
 def interval(
@@ -34,87 +36,90 @@ def interval(
     An end on a bound of the domain means that the data do not limit the parameter on that side.
     """
     solved = {float(best.x[index]): best}
-    profile = _Profile(problem, best, index, rise, _hidden(problem, best.x, index, rise), solved)
+    shapes = _undefined_shapes(problem, best.x, index, rise)
+    profile = _Profile(problem, best, index, rise, shapes, solved)
     return profile.end(float(problem.low[index])), profile.end(float(problem.high[index]))
 
 
-def _hidden(problem: Problem, x: FloatArray, index: int, rise: float) -> list[int]:
-    """The shapes that change nothing where the scale at `index` is as small as it may be."""
+def _undefined_shapes(problem: Problem, x: FloatArray, index: int, rise: float) -> list[int]:
+    """Indices of the shape parameters without effect where the scale at `index` is at its least."""
     parameters = problem.model.parameters
     shapes = [i for i, p in enumerate(parameters) if not p.scale and x[i] > p.low]
     if not parameters[index].scale or not shapes:
         return []
     without = x.copy()
     without[index] = problem.low[index]
-    slopes = np.linalg.norm(problem.jacobian(without, shapes), axis=0)
-    changes = slopes * (problem.high - problem.low)[shapes]
-    unseen = changes < _UNSEEN * math.sqrt(rise)
-    return [i for i, nothing in zip(shapes, unseen, strict=True) if nothing]
+    gradients = np.linalg.norm(problem.jacobian(without, shapes), axis=0)
+    changes = gradients * (problem.high - problem.low)[shapes]
+    no_effect = changes < _NO_EFFECT * math.sqrt(rise)
+    return [i for i, without_effect in zip(shapes, no_effect, strict=True) if without_effect]
 
 
 @dataclass(frozen=True, slots=True)
 class _Profile:
-    """chi2 over one parameter, the others fitted anew; `solved` has what was found so far.
+    """chi2 as a function of one parameter, minimised over the others.
 
-    hidden: parameters that say nothing where this one is 0, as a lobe's width of its strength. At
-    their lower bounds even a strong lobe may lie unseen between the points.
+    undefined_shapes: parameters without effect where this one is 0, as the width of a lobe of
+    strength 0. At their lower bounds even a strong lobe may fit unseen between the points.
+    solved: the minima found so far, by value of the parameter.
     """
 
     problem: Problem
     best: Minimum
     index: int
     rise: float
-    hidden: list[int]
+    undefined_shapes: list[int]
     solved: dict[float, Minimum]
 
     def excess(self, value: float) -> float:
-        """How far chi2 is above what is allowed, as a root: about linear in the distance."""
+        """Root of the rise of chi2 less root of the allowed rise: about linear in the distance."""
         if value not in self.solved:
             self.solved[value] = self._solve(value)
         above = max(self.solved[value].chi2 - self.best.chi2, 0.0)
         return math.sqrt(above) - math.sqrt(self.rise)
 
     def _solve(self, value: float) -> Minimum:
-        """The others fitted from the first start that leads to where chi2 is allowed."""
+        """Fit of the others, from the first start that reaches an allowed chi2."""
         for start in self._starts(value):
             x = start.copy()
             x[self.index] = value
             at = Minimum(x, self.problem.chi2(x), True, "")
-            if at.chi2 - self.best.chi2 > self.rise:  # else no need: a fit only lowers chi2
-                at = self.problem.solve(x, [self.index], enough=_SETTLED * self.rise)
+            if at.chi2 - self.best.chi2 > self.rise:  # else not needed: a fit only lowers chi2
+                at = self.problem.solve(x, [self.index], atol=_CHI2_TOLERANCE * self.rise)
             if at.chi2 - self.best.chi2 <= self.rise:
                 break
         return at
 
     def _starts(self, value: float) -> Iterator[FloatArray]:
-        """What was found at the nearest value, the best fit, and what may lie hidden."""
+        """The solution at the nearest value, the best fit, and narrow shapes between points."""
         yield self.solved[min(self.solved, key=lambda known: abs(known - value))].x
         yield self.best.x
-        if self.hidden:
+        if self.undefined_shapes:
             narrow = self.best.x.copy()
-            narrow[self.hidden] = self.problem.low[self.hidden]
+            narrow[self.undefined_shapes] = self.problem.low[self.undefined_shapes]
             yield narrow
 
     def end(self, bound: float) -> float:
-        """The end towards a bound of the domain."""
+        """End of the interval towards a bound of the domain."""
         middle = float(self.best.x[self.index])
         if middle == bound or self.excess(bound) <= 0:
             return bound
         inner, outer = self._bracket(middle, bound)
-        return float(brentq(self.excess, inner, outer, xtol=_RELATIVE * abs(outer - middle)))
+        return float(brentq(self.excess, inner, outer, xtol=_RTOL * abs(outer - middle)))
 
     def _bracket(self, middle: float, bound: float) -> tuple[float, float]:
-        """A value inside the interval and one outside, which lies no further than the bound."""
+        """One value inside the interval and one outside, no further away than the bound."""
         inner, away = middle, math.copysign(self._first_step(), bound - middle)
         while abs(away) < abs(bound - middle):
             outer = middle + away
             if self.excess(outer) > 0:
                 return inner, outer
-            inner, away = outer, away * _WIDEN
+            inner, away = outer, away * _GROWTH
         return inner, bound
 
     def _first_step(self) -> float:
-        """The distance at which the parameter alone would raise chi2 by `rise`, roughly."""
+        """Approximate distance at which this parameter alone would raise chi2 by `rise`."""
         domain = float(self.problem.high[self.index] - self.problem.low[self.index])
-        slope = float(np.linalg.norm(self.problem.jacobian(self.best.x, [self.index])))
-        return max(_NEAREST * domain, min(domain, math.sqrt(self.rise) / max(slope, 1e-300)))
+        gradient = float(np.linalg.norm(self.problem.jacobian(self.best.x, [self.index])))
+        step = math.sqrt(self.rise) / max(gradient, 1e-300)
+        return max(_MIN_STEP * domain, min(domain, step))

@@ -1,8 +1,9 @@
-"""Relative measurements: a radiance that no reference ties to the BRDF.
+"""Relative measurements: radiance in a unit of its own, without a reference of known BRDF.
 
-The model then has one more parameter, `per_brdf`, by which its BRDF is multiplied. A scale (an
-albedo, a lobe's strength) cannot be told from it, but for what the model says of interreflection,
-which is no measurement: it is reported as not determined, with the interval in which it may lie.
+The model gets one more parameter, `per_brdf`, a factor on its BRDF. The data cannot separate it
+from a scale of the model (an albedo, the strength of a lobe), except by the model's
+interreflection, which is no measurement. Both are therefore reported as not determined, with the
+interval in which they may lie.
 """
 
 from __future__ import annotations
@@ -15,18 +16,18 @@ from analysis.data.measurements import Measurements
 from analysis.models import Model, Parameter
 from instrument.geometry import Brdf, FloatArray, Geometry
 
-NAME = "per_brdf"
+FACTOR_NAME = "per_brdf"
 
-# The search for `per_brdf` spans this factor to either side of what an albedo of a half takes.
+# Domain of `per_brdf`: this factor to either side of its value at an albedo of 1/2.
 _SPAN = 1e3
-# The least scale that is looked at, as a part of its largest.
-_LEAST = 1e-6
+# Smallest value of a scale, as a fraction of its largest.
+_MIN_SCALE = 1e-6
 
 
 def normalise_lamp_levels(m: Measurements, brdf: Brdf) -> Measurements:
-    """The measurements with each setting's level brought to that of a model near the data.
+    """Divide each lamp setting by its level relative to a model near the data (BRDF in 1/sr).
 
-    What a level then still may be off is small, so that it is a shared error like any other.
+    The remaining error of a level is small and counts as a shared error like any other.
     """
     if not m.free_levels:
         return m
@@ -39,42 +40,41 @@ def normalise_lamp_levels(m: Measurements, brdf: Brdf) -> Measurements:
 
 
 def unscaled_parameters(model: Model) -> frozenset[str]:
-    """The parameters of a relative model that nothing ties down."""
-    return frozenset(p.name for p in model.parameters if p.scale or p.name == NAME)
+    """Parameters that relative measurements do not determine: all scales, and `per_brdf`."""
+    return frozenset(p.name for p in model.parameters if p.scale or p.name == FACTOR_NAME)
 
 
-def relative(model: Model, values: FloatArray) -> Model:
-    """The model of relative `values` (N,): `model` times `per_brdf`, in their unit per 1/sr.
+def relative_model(model: Model, values: FloatArray) -> Model:
+    """Return `model` times `per_brdf`, for relative `values` (N,) in a unit of their own.
 
-    Raises `ValueError` where the mean of the values is not positive: nothing was seen.
+    Raises `ValueError` where the mean of the values is not positive: the camera saw no light.
     """
     mean = float(np.mean(values))
     if not mean > 0:
         raise ValueError(f"mean of the relative values = {mean:g}; allowed: more than 0")
     middle = mean / (0.5 / np.pi)
     low, high = middle / _SPAN, middle * _SPAN
-    factor = Parameter(NAME, "sr", low, high, middle, starts=(middle,), logarithmic=True)
+    factor = Parameter(FACTOR_NAME, "sr", low, high, middle, starts=(middle,), logarithmic=True)
 
     def kernel(geometry: Geometry, **parameters: float) -> FloatArray:
-        per_brdf = parameters.pop(NAME)
+        per_brdf = parameters.pop(FACTOR_NAME)
         return per_brdf * model.kernel(geometry, **parameters)
 
-    def gradient(geometry: Geometry, **parameters: float) -> dict[str, FloatArray]:
-        per_brdf = parameters.pop(NAME)
-        own = {name: per_brdf * s for name, s in model.gradient(geometry, **parameters).items()}
-        return {**own, NAME: np.asarray(model.kernel(geometry, **parameters))}
+    def gradients(geometry: Geometry, **parameters: float) -> dict[str, FloatArray]:
+        per_brdf = parameters.pop(FACTOR_NAME)
+        own = {name: per_brdf * g for name, g in model.gradient(geometry, **parameters).items()}
+        return {**own, FACTOR_NAME: np.asarray(model.kernel(geometry, **parameters))}
 
-    # Products of scales are searched for by their logarithms: in these their valley is straight.
+    # chi2 has a valley along a product of scales; in their logarithms it is straight.
     own = tuple(
-        replace(p, low=_LEAST * p.high, logarithmic=True) if p.scale else p
+        replace(p, low=_MIN_SCALE * p.high, logarithmic=True) if p.scale else p
         for p in model.parameters
     )
-    parameters = (*own, factor)
     return replace(
         model,
-        parameters=parameters,
+        parameters=(*own, factor),
         kernel=kernel,
-        gradient_kernel=gradient,
+        gradient_kernel=gradients,
         validity_kernel=None,
         terms=(),
     )

@@ -1,1 +1,1 @@
-"""analysis/report."""
+"""HTML report of a run, made from plain data. Open `page.py` first."""

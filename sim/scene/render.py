@@ -15,7 +15,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from analysis.data.acceptance import Acceptance, radiance, rings_each
+from analysis.data.acceptance import Acceptance, radiance, required_rings
 from instrument.geometry import FloatArray
 from instrument.pinhole import Pinhole, apply_homography, rectangle_mm
 from instrument.pixel_coverage import Coverage, polygon_coverage
@@ -114,7 +114,7 @@ def _rings(scene: Scene) -> int:
     key = (scene.surface, theta_i, dphi)
     if key not in scene.rings:
         acceptance = _acceptance(scene)
-        scene.rings[key] = rings_each(scene.brdf(), theta_i, _VIEW_ANGLES_DEG, dphi, acceptance)
+        scene.rings[key] = required_rings(scene.brdf(), theta_i, _VIEW_ANGLES_DEG, dphi, acceptance)
     near = np.abs(_VIEW_ANGLES_DEG - scene.true_deg["theta_r"]) <= 1.0
     return int(scene.rings[key][near].max(initial=1))
 

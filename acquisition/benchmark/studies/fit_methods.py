@@ -23,7 +23,7 @@ from analysis.data.covariance import Covariance
 from analysis.data.measurements import Measurements
 from analysis.fit.first_fit import first_fit
 from analysis.fit.problem import Problem
-from analysis.fit.starting_values import bounded_least_squares, starts
+from analysis.fit.starting_values import bounded_least_squares, starting_values
 from analysis.models import MODELS, Model
 from instrument.geometry import FloatArray, Geometry
 
@@ -223,10 +223,10 @@ class Optimum:
 
 def optimum(problem: Problem, count: int = 12) -> Optimum:
     """The deepest of many descents, from the grid and from random starts, as far as they go."""
-    begin = [*starts(problem, _GRID_STARTS), *random_starts(problem, count)]
-    ends = [problem.solve(with_scales(problem, x), settled=_TIGHT) for x in begin]
+    begin = [*starting_values(problem, _GRID_STARTS), *random_starts(problem, count)]
+    ends = [problem.solve(with_scales(problem, x), rtol=_TIGHT) for x in begin]
     best = min(ends, key=lambda m: m.chi2)
-    best = problem.solve(best.x, settled=_TIGHT)
+    best = problem.solve(best.x, rtol=_TIGHT)
     return Optimum(best.x, np.linalg.qr(problem.jacobian(best.x)).R)
 
 
