@@ -16,7 +16,7 @@ from acquisition.results.sources import Source, Wanted, read_source
 from acquisition.results.summary import VERDICTS, parameters_of, validity_note, value_text
 from acquisition.terminal.console import out
 from analysis.choice.choice import Choice, choose
-from analysis.choice.fit_json import nothing, to_json
+from analysis.choice.fit_json import no_fit_json, to_json
 from analysis.choice.ladder import METHODS, MethodOfFit
 from analysis.fit.fit import FitResult
 from instrument.errors import InputError, NotDetermined
@@ -44,7 +44,7 @@ def fit_source(
         choice = choose(source.measurements, source.acceptance, names, robust, way)
     except NotDetermined as error:
         if as_json:
-            _print_json(nothing(str(error)))
+            _print_json(no_fit_json(str(error)))
         raise
     if as_json:
         _print_json(to_json(choice))

@@ -13,7 +13,7 @@ from acquisition.results.measurements_csv import measurements_csv
 from acquisition.results.reduction import reduced_run
 from acquisition.results.report_inputs import report_data
 from acquisition.results.summary import budget, headline, notes, parameters_of
-from analysis.choice.fit_json import nothing, to_json
+from analysis.choice.fit_json import no_fit_json, to_json
 from analysis.report.data import Parameter
 from analysis.report.page import write_report
 from instrument.config.load import Loaded
@@ -49,7 +49,7 @@ def finish(record: Record, loaded: Loaded) -> Outcome:
         headline(fitted),
         () if fitted.chosen is None else parameters_of(fitted.chosen),
         notes(reduced, fitted, record, loaded),
-        nothing(fitted.reason) if fitted.choice is None else to_json(fitted.choice),
+        no_fit_json(fitted.reason) if fitted.choice is None else to_json(fitted.choice),
         record.folder / "report.html",
     )
     with _kept(record.folder):

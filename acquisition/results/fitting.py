@@ -76,13 +76,13 @@ def measurements(reduced: Reduced, loaded: Loaded, without: Sequence[str] = ()) 
     brdf = reduced.brdf if reduced.has_brdf else reduced.radiance
     brdf = brdf[keep] if reduced.has_brdf else brdf[keep] / np.cos(np.radians(theta_i_deg))
     return Measurements(
-        theta_i_deg,
-        np.array([p.theta_r_deg for p in points]),
-        np.array([p.dphi_deg for p in points]),
-        brdf,
-        root_sum_square(own) * np.abs(brdf),
+        theta_i_deg=theta_i_deg,
+        theta_r_deg=np.array([p.theta_r_deg for p in points]),
+        dphi_deg=np.array([p.dphi_deg for p in points]),
+        brdf=brdf,
+        u_random=root_sum_square(own) * np.abs(brdf),
         lamp_setting=np.array([p.lamp_setting for p in points], dtype=np.int64),
-        shared=tuple(e.of(keep) for e in shared if e.name not in without),
+        shared=tuple(e.subset(keep) for e in shared if e.name not in without),
         u_theta_i_deg=axes.theta_i.u_deg,
         u_theta_r_deg=axes.theta_r.u_deg,
         u_dphi_deg=axes.dphi.u_deg,

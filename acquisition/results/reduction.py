@@ -199,7 +199,7 @@ def _shared_by_tile(
     u_certificate = tile.u_reflectance / tile.reflectance
     return (
         SharedError(TILE_READING, u_reading, settings),
-        SharedError.of_all(TILE, u_certificate, len(points)),
+        SharedError.common_to_all(TILE, u_certificate, len(points)),
     )
 
 

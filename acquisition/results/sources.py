@@ -116,7 +116,7 @@ def _cut(source: Source, max_theta_deg: float) -> Source:
     if np.all(inside):
         return source
     note = f"{int(np.sum(~inside))} of {m.size} points lie beyond {max_theta_deg:g} degrees"
-    return replace(source, measurements=m.of(inside), notes=(*source.notes, note))
+    return replace(source, measurements=m.subset(inside), notes=(*source.notes, note))
 
 
 def _made_relative(path: Path, m: Measurements) -> Measurements:

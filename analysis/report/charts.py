@@ -1,7 +1,7 @@
-"""The report's charts, as SVG text to stand inside an HTML page.
+"""Charts of the report, as SVG text for an HTML page.
 
-Each incidence keeps its colour, marker and line style in every chart, so that the charts can be
-read without colour. Words from outside do not enter a chart; they belong into its caption.
+Each incidence has the same colour, marker and line style in every chart, so that the charts can be
+read without colour. Texts from the record appear in captions only, never in a chart.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.report.data import Sweep
+from analysis.report.data import PlottedSweep
 from analysis.report.style import BAND, GREY, GRID, INK, Dashes, style_of, svg_of
 from instrument.geometry import FloatArray
 
@@ -19,31 +19,31 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# More small panels than this would be too small to read and slow to draw.
-MOST_PANELS = 12
+# More panels would be too small to read and slow to draw.
+MAX_PANELS = 12
 
-_LOG_FROM = 40.0  # largest over smallest value from which the scale is logarithmic
+_LOG_RATIO = 40.0  # largest over smallest value above which the scale is logarithmic
 _ANGLES_DEG = (-90, -60, -30, 0, 30, 60, 90)
-_FEW_ANGLES_DEG = (-60, -30, 0, 30, 60)
+_NARROW_ANGLES_DEG = (-60, -30, 0, 30, 60)
 _LEGEND_COLUMNS = 4
 _RUNNER_UP: tuple[Dashes, ...] = ((0, (5, 2)), (0, (1.5, 1.5)))
 
 
-def sweep_label(sweep: Sweep, planes: int) -> str:
-    """How a sweep is called: by its incidence, and by its plane where there are several."""
+def sweep_label(sweep: PlottedSweep, planes: int) -> str:
+    """Label of a sweep: its incidence, and its plane where there are several."""
     plane = f", Δφ = {sweep.plane_deg:g}°" if planes > 1 or not sweep.in_plane else ""
     return f"θᵢ = {round(sweep.theta_i_deg, 1):g}°{plane}"
 
 
-def normalised_charts(sweeps: Sequence[Sweep]) -> list[str]:
-    """L(theta_r) / L(0) against theta_r over the residuals: a column a plane, two to a chart."""
+def normalised_charts(sweeps: Sequence[PlottedSweep]) -> list[str]:
+    """L(theta_r) / L(0) against theta_r above the residuals: one column per plane, two a chart."""
     planes = _planes(sweeps)
     pairs = [planes[i : i + 2] for i in range(0, len(planes), 2)]
     return [_normalised_chart(pair, sweeps, f"normalised{n}") for n, pair in enumerate(pairs)]
 
 
-def brdf_chart(sweeps: Sequence[Sweep], quantity: str) -> str:
-    """The measured quantity of each sweep in a small panel, with the lines of its models."""
+def brdf_chart(sweeps: Sequence[PlottedSweep], quantity: str) -> str:
+    """Measured quantity of each sweep in a panel of its own, with lines of the models."""
     shown = thinned(sweeps)
     columns = min(len(shown), 4 if len(shown) in (4, 7, 8) or len(shown) > 9 else 3)
     rows = -(-len(shown) // columns)
@@ -62,7 +62,7 @@ def brdf_chart(sweeps: Sequence[Sweep], quantity: str) -> str:
             ax.set_visible(False)
         _value_axis(axes[0, 0], [(s, 1.0) for s in shown])
         axes[0, 0].set_xlim(-92, 92)
-        axes[0, 0].set_xticks(_FEW_ANGLES_DEG)
+        axes[0, 0].set_xticks(_NARROW_ANGLES_DEG)
         for ax in axes.flat[max(len(shown) - columns, 0) : len(shown)]:
             ax.set_xlabel("view angle θᵣ (°)")
             ax.tick_params(labelbottom=True)
@@ -72,8 +72,8 @@ def brdf_chart(sweeps: Sequence[Sweep], quantity: str) -> str:
     return svg_of(0.9 + 2.2 * rows, draw, "brdf")
 
 
-def polar_chart(sweeps: Sequence[Sweep], quantity: str) -> str:
-    """The measured quantity as the distance from the sample, in the direction of the camera."""
+def polar_chart(sweeps: Sequence[PlottedSweep], quantity: str) -> str:
+    """Polar chart of the measured quantity in the direction of the camera."""
     planes = _planes(sweeps)
     columns = min(len(planes), 2)
     rows = -(-len(planes) // columns)
@@ -94,23 +94,25 @@ def polar_chart(sweeps: Sequence[Sweep], quantity: str) -> str:
     return svg_of((0.24 + top) * unit_in * rows + 0.1, draw, "polar")
 
 
-def thinned(sweeps: Sequence[Sweep]) -> list[Sweep]:
-    """At most `MOST_PANELS` of the sweeps, evenly chosen."""
-    if len(sweeps) <= MOST_PANELS:
+def thinned(sweeps: Sequence[PlottedSweep]) -> list[PlottedSweep]:
+    """At most `MAX_PANELS` of the sweeps, evenly selected."""
+    if len(sweeps) <= MAX_PANELS:
         return list(sweeps)
-    chosen = np.linspace(0, len(sweeps) - 1, MOST_PANELS).round().astype(int)
+    chosen = np.linspace(0, len(sweeps) - 1, MAX_PANELS).round().astype(int)
     return [sweeps[i] for i in chosen]
 
 
-def _planes(sweeps: Sequence[Sweep]) -> list[list[Sweep]]:
-    """The sweeps of each plane of the camera."""
-    planes: dict[int, list[Sweep]] = {}
+def _planes(sweeps: Sequence[PlottedSweep]) -> list[list[PlottedSweep]]:
+    """The sweeps grouped by plane of the camera."""
+    planes: dict[int, list[PlottedSweep]] = {}
     for sweep in sweeps:
         planes.setdefault(sweep.plane, []).append(sweep)
     return list(planes.values())
 
 
-def _normalised_chart(planes: Sequence[Sequence[Sweep]], sweeps: Sequence[Sweep], name: str) -> str:
+def _normalised_chart(
+    planes: Sequence[Sequence[PlottedSweep]], sweeps: Sequence[PlottedSweep], name: str
+) -> str:
     rows = 2 if any(np.any(np.isfinite(s.residual)) for s in sweeps) else 1
     columns = min(len(_planes(sweeps)), 2)
     titled = columns > 1 or not planes[0][0].in_plane
@@ -145,7 +147,7 @@ def _normalised_chart(planes: Sequence[Sequence[Sweep]], sweeps: Sequence[Sweep]
     return svg_of(height, draw, name)
 
 
-def _normalised_panel(ax: Axes, plane: Sequence[Sweep], columns: int) -> None:
+def _normalised_panel(ax: Axes, plane: Sequence[PlottedSweep], columns: int) -> None:
     for sweep in plane:
         if not np.isfinite(sweep.at_normal):
             continue
@@ -157,13 +159,13 @@ def _normalised_panel(ax: Axes, plane: Sequence[Sweep], columns: int) -> None:
             _lamp_mark(ax, sweep, name)
 
 
-def _plane_title(ax: Axes, sweep: Sweep) -> None:
+def _plane_title(ax: Axes, sweep: PlottedSweep) -> None:
     other = (sweep.plane_deg + 180.0) % 360.0
     title = f"Δφ = {sweep.plane_deg:g}° (negative θᵣ: Δφ = {other:g}°)"
     ax.set_title(title, color=INK, loc="left", pad=19)
 
 
-def _residual_panel(ax: Axes, plane: Sequence[Sweep], largest: float) -> None:
+def _residual_panel(ax: Axes, plane: Sequence[PlottedSweep], largest: float) -> None:
     ax.axhspan(-2.0, 2.0, color=BAND, zorder=0)
     ax.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
     for sweep in plane:
@@ -175,12 +177,12 @@ def _residual_panel(ax: Axes, plane: Sequence[Sweep], largest: float) -> None:
         ax.set_yticks([-2, 0, 2])
 
 
-def _largest_residual(sweeps: Sequence[Sweep]) -> float:
+def _largest_residual(sweeps: Sequence[PlottedSweep]) -> float:
     sizes = np.abs(np.concatenate([s.residual for s in sweeps]))
     return max(3.5, 1.15 * float(np.max(sizes[np.isfinite(sizes)], initial=0.0)))
 
 
-def _brdf_panel(ax: Axes, sweep: Sweep) -> None:
+def _brdf_panel(ax: Axes, sweep: PlottedSweep) -> None:
     _points(ax, sweep, sweep.value, sweep.u, size=3.8)
     for line, style in zip(sweep.lines[1:], _RUNNER_UP, strict=False):
         ax.plot(sweep.line_deg, line, color=GREY, linewidth=1.1, zorder=7, linestyle=style)
@@ -190,8 +192,8 @@ def _brdf_panel(ax: Axes, sweep: Sweep) -> None:
         _lamp_mark(ax, sweep, "")
 
 
-def _polar_panel(ax: Axes, plane: Sequence[Sweep], quantity: str) -> float:
-    """Draw a plane; returns the radius of its edge. Without `quantity` it is a small panel."""
+def _polar_panel(ax: Axes, plane: Sequence[PlottedSweep], quantity: str) -> float:
+    """Draw a plane and return the radius of its edge; a small panel has no `quantity`."""
     unflagged = [s.value[~s.flagged] for s in plane]
     rings = _rings(max(float(np.max(v, initial=0.0)) for v in unflagged))
     edge = rings[-1]
@@ -212,8 +214,8 @@ def _polar_panel(ax: Axes, plane: Sequence[Sweep], quantity: str) -> float:
     return float(edge)
 
 
-def _lamp_arrow(ax: Axes, sweep: Sweep, edge: float, tip: float) -> None:
-    """An arrow from the lamp, with the incidence's marker at its tail."""
+def _lamp_arrow(ax: Axes, sweep: PlottedSweep, edge: float, tip: float) -> None:
+    """Draw an arrow from the lamp, with the marker of the incidence at its tail."""
     colour, marker, _ = style_of(sweep.incidence)
     x, y = _polar(np.full(3, sweep.theta_i_deg), np.array([1.34, tip, 1.39]) * edge)
     arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.4, "shrinkA": 0, "shrinkB": 0}
@@ -256,8 +258,10 @@ def _rings(largest: float) -> FloatArray:
     return ticks[ticks >= 0]
 
 
-def _points(ax: Axes, sweep: Sweep, value: FloatArray, u: FloatArray, size: float = 4.5) -> None:
-    """Full dots for points in the fit, hollow ones for the others; a cross over a flagged one."""
+def _points(
+    ax: Axes, sweep: PlottedSweep, value: FloatArray, u: FloatArray, size: float = 4.5
+) -> None:
+    """Plot filled markers for points in the fit, open ones for others, crosses on flagged ones."""
     colour, marker, _ = style_of(sweep.incidence)
     x, flagged = sweep.theta_r_deg, sweep.flagged
     hollow = flagged | (~sweep.fitted & bool(np.any(sweep.fitted)))
@@ -275,8 +279,8 @@ def _line(ax: Axes, x: FloatArray, y: FloatArray, incidence: int, linewidth: flo
     ax.plot(x, y, color=colour, linestyle=dashes, linewidth=linewidth, zorder=2)
 
 
-def _lamp_mark(ax: Axes, sweep: Sweep, name: str) -> None:
-    """A small arrow at theta_r = theta_i above the panel, with its angle where it has a name."""
+def _lamp_mark(ax: Axes, sweep: PlottedSweep, name: str) -> None:
+    """Mark theta_r = theta_i above the panel; with a `name`, also write the angle."""
     colour = style_of(sweep.incidence)[0]
     at, above = sweep.theta_i_deg, ax.get_xaxis_transform()
     ax.axvline(at, color=colour, linewidth=0.7, linestyle=(0, (1, 3)), zorder=1)
@@ -292,18 +296,18 @@ def _lamp_mark(ax: Axes, sweep: Sweep, name: str) -> None:
 
 
 def _view_axis(ax: Axes, in_plane: bool, columns: int) -> None:
-    """The axis of the view angle, with words for its two sides."""
+    """Set up the axis of the view angle and label its two sides."""
     ax.set_xlim(-92, 92)
-    ax.set_xticks(_ANGLES_DEG if columns == 1 else _FEW_ANGLES_DEG)
+    ax.set_xticks(_ANGLES_DEG if columns == 1 else _NARROW_ANGLES_DEG)
     gap = "\u2003" * (8 if columns == 1 else 2)
     away = "mirror side" if in_plane else "far side"
     ax.set_xlabel(f"← {away}{gap}view angle θᵣ (°){gap}lamp’s side →")
 
 
-def _value_axis(ax: Axes, scaled: Sequence[tuple[Sweep, float]]) -> None:
-    """From zero to a little above the largest value; logarithmic where values differ greatly.
+def _value_axis(ax: Axes, scaled: Sequence[tuple[PlottedSweep, float]]) -> None:
+    """Scale from zero to a little above the largest value, or logarithmic for a large range.
 
-    A flagged point far off does not flatten the others: it may fall outside.
+    A flagged outlier does not compress the others: it may lie outside the axes.
     """
     good = [s.value[~s.flagged] / unit for s, unit in scaled]
     lines = [s.lines[0] / unit for s, unit in scaled if s.lines]
@@ -312,7 +316,7 @@ def _value_axis(ax: Axes, scaled: Sequence[tuple[Sweep, float]]) -> None:
     flagged_low, flagged_high = _extent([*good, *lines, *flagged])
     if not np.isfinite(flagged_low):
         return
-    if low > 0 and high > _LOG_FROM * low:
+    if low > 0 and high > _LOG_RATIO * low:
         _log_axis(ax, low / 1.5, high * 1.5)
         return
     if np.isfinite(low):
@@ -334,24 +338,24 @@ def _log_axis(ax: Axes, low: float, high: float) -> None:
 
 
 def _extent(arrays: Sequence[FloatArray]) -> tuple[float, float]:
-    """Smallest and largest finite value; NaN where there is none."""
+    """Smallest and largest finite value, NaN if there is none."""
     values = np.concatenate(arrays) if arrays else np.array([])
     values = values[np.isfinite(values)]
     return (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
 
 
-def _incidences(sweeps: Sequence[Sweep]) -> dict[int, float]:
+def _incidences(sweeps: Sequence[PlottedSweep]) -> dict[int, float]:
     return {s.incidence: s.theta_i_deg for s in sorted(sweeps, key=lambda s: s.incidence)}
 
 
-def _legend_shape(sweeps: Sequence[Sweep]) -> tuple[int, int]:
-    """Rows and columns of the legend."""
+def _legend_shape(sweeps: Sequence[PlottedSweep]) -> tuple[int, int]:
+    """Numbers of rows and columns of the legend."""
     entries = len(_incidences(sweeps))
     rows = -(-entries // _LEGEND_COLUMNS)
     return rows, -(-entries // rows)
 
 
-def _legend(figure: Figure, sweeps: Sequence[Sweep]) -> None:
+def _legend(figure: Figure, sweeps: Sequence[PlottedSweep]) -> None:
     from matplotlib.lines import Line2D
 
     handles = []
@@ -369,7 +373,7 @@ def _legend(figure: Figure, sweeps: Sequence[Sweep]) -> None:
 def _margins(
     figure: Figure, left: float, right: float, top: float, bottom: float
 ) -> dict[str, float]:
-    """Margins in inches as parts of the figure."""
+    """Margins in inches as fractions of the figure."""
     width, height = figure.get_size_inches()
     return {
         "left": left / width,

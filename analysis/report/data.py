@@ -1,4 +1,4 @@
-"""What a report shows: plain values, ready to draw, and how they fall into sweeps."""
+"""Content of a report: plain values, ready to plot, and their grouping into sweeps."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from instrument.record.reading import Preview
 
 Rows = tuple[tuple[str, str], ...]
 
-# BRDF in 1/sr of theta_i_deg, dphi_deg and an array of signed theta_r_deg.
+# BRDF in 1/sr as a function of theta_i_deg, dphi_deg and signed theta_r_deg (M,).
 Curve = Callable[[float, float, FloatArray], FloatArray]
 
-# A sweep's lines: the chosen model and at most this many runners-up.
-MOST_LINES = 3
+# Models plotted per sweep, the chosen one included.
+MAX_LINES = 3
 
-# Angles closer together than this are one setting of the lamp or one plane of the camera.
+# Angles that differ by less are one setting of the lamp, or one plane of the camera.
 _SAME_ANGLE_DEG = 0.25
 _GRID_STEP_DEG = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A fitted value; `u` is None where the data do not determine it.
+    """A fitted parameter; `u` is None where the data do not determine it.
 
-    `interval` then says where it may lie (95 %), in the same unit.
+    `interval` is then its 95 % interval, in the same unit.
     """
 
     name: str
@@ -37,13 +37,13 @@ class Parameter:
     unit: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """A model that was fitted, and how well it did.
+    """A fitted model and its agreement with the data.
 
-    `residuals` are (measured - model - errors that points share) / u of the points that entered
-    the fit, in their order.
-    `curve` gives the model's BRDF in 1/sr with the fitted parameters.
+    residuals: (measured - model - errors that points share) / u of the points in the fit, in their
+        order.
+    curve: BRDF of the fitted model.
     """
 
     name: str
@@ -58,15 +58,17 @@ class Candidate:
     curve: Curve | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ReportData:
-    """All that a report says. Angles in degrees with theta_r signed; one entry a point in each.
+    """Content of a report. Arrays and `flags` have one entry per point (N,).
 
-    `brdf` (1/sr) is NaN throughout where no white tile was measured; `radiance` is in counts/s.
-    `flags` are empty for a point with nothing wrong; `fitted` marks the points that entered the
-    fit. `verdict` begins with the headline; `verdict_kind` is `adequate`, `none adequate`,
-    `not identifiable`, or empty where nothing was fitted, and sets the colour of its box.
-    `budget` rows are (component, median relative u in %, share of the variance in %).
+    theta_i_deg, dphi_deg, theta_r_deg: in degrees, theta_r signed.
+    brdf, u_brdf: in 1/sr; NaN throughout where no white tile was measured.
+    radiance, u_radiance: in counts/s.
+    flags: empty for a good point. fitted: True for the points in the fit.
+    verdict: the headline, then further sentences. verdict_kind: `adequate`, `none adequate`, `not
+        identifiable`, or empty where nothing was fitted; sets the colour of the box.
+    budget: rows of (component, median relative u in %, share of the variance in %).
     """
 
     title: str
@@ -110,17 +112,17 @@ class ReportData:
 
     @property
     def has_brdf(self) -> bool:
-        """Whether a white tile tied the scale down for at least one point."""
+        """True if at least one point has a BRDF, relative to a white tile."""
         return bool(np.any(np.isfinite(self.brdf)))
 
     @property
     def flagged(self) -> BoolArray:
-        """Points with something wrong."""
+        """Mask (N,) of the points with a flag."""
         return np.array([bool(flag) for flag in self.flags], dtype=bool)
 
     @property
     def ranked(self) -> tuple[Candidate, ...]:
-        """The candidates, the chosen one first and then by BIC; those without one come last."""
+        """The candidates by rising BIC, the chosen one first; those that failed come last."""
 
         def rank(candidate: Candidate) -> tuple[bool, bool, float]:
             bic = candidate.bic if candidate.bic is not None else np.inf
@@ -133,21 +135,22 @@ class ReportData:
         return tuple(sorted(self.candidates, key=rank))
 
     @property
-    def drawn(self) -> tuple[Candidate, ...]:
-        """The candidates whose lines are drawn: the chosen one and its runners-up."""
+    def plotted(self) -> tuple[Candidate, ...]:
+        """The candidates that are plotted as lines: the chosen one and those next to it by BIC."""
         with_curve = [c for c in self.ranked if c.curve is not None and (c.chosen or c.converged)]
-        return tuple(with_curve[:MOST_LINES])
+        return tuple(with_curve[:MAX_LINES])
 
 
-@dataclass(frozen=True, slots=True)
-class Sweep:
-    """The points of one lamp direction in one plane, by increasing theta_r, with models' lines.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlottedSweep:
+    """Points (P,) of one lamp direction in one plane by rising theta_r, with lines of the models.
 
-    `plane` and `incidence` number the planes and the lamp's angles of the whole run.
-    `dphi_deg` is folded into -90..90, so that positive theta_r is always the lamp's side.
-    `value` and `u` are BRDF in 1/sr, or radiance in counts/s where there is no white tile.
-    `lines` are in the same unit at `line_deg`, one for each of `ReportData.drawn`; without a tile
-    each is scaled to the points. `at_normal` is the value at theta_r = 0.
+    plane, incidence: numbers of the plane and of the lamp's angle within the run.
+    dphi_deg: folded into -90 to 90, so that positive theta_r is always the lamp's side.
+    value, u: BRDF in 1/sr, or radiance in counts/s where there is no white tile.
+    lines: in the same unit, at `line_deg` (M,), one for each of `ReportData.plotted`; without a
+        tile each is scaled to the points.
+    at_normal: value at theta_r = 0, in the same unit.
     """
 
     plane: int
@@ -166,18 +169,18 @@ class Sweep:
 
     @property
     def in_plane(self) -> bool:
-        """Whether the camera passes through the lamp's own plane."""
+        """True if the camera moves in the plane of the lamp."""
         return abs(self.dphi_deg) < _SAME_ANGLE_DEG
 
     @property
     def plane_deg(self) -> float:
-        """Azimuth of the positive side from the lamp's, 0-360, in whole tenths."""
+        """Azimuth of the side of positive theta_r from the lamp's, 0 to 360 degrees, rounded."""
         return round(self.dphi_deg, 1) % 360.0
 
 
-def sweeps_of(data: ReportData) -> tuple[Sweep, ...]:
-    """The points that can be drawn, one sweep for each lamp direction in each plane."""
-    value, _ = _shown(data)
+def group_sweeps(data: ReportData) -> tuple[PlottedSweep, ...]:
+    """Group the points with finite values into sweeps: one per lamp direction and plane."""
+    value, _ = _value_and_u(data)
     dphi_deg, theta_r_deg = _folded(data.dphi_deg, data.theta_r_deg)
     usable = np.isfinite(value) & np.isfinite(data.theta_i_deg)
     usable &= np.isfinite(dphi_deg) & np.isfinite(theta_r_deg)
@@ -188,28 +191,24 @@ def sweeps_of(data: ReportData) -> tuple[Sweep, ...]:
         at = np.flatnonzero((plane == p) & (incidence == i))
         at = at[np.argsort(theta_r_deg[at], kind="stable")]
         dphi = float(np.median(dphi_deg[at]))
-        sweeps.append(_sweep(data, (int(p), int(i)), at, dphi, theta_r_deg[at]))
+        sweeps.append(_sweep(data, int(p), int(i), at, dphi, theta_r_deg[at]))
     return tuple(sorted(sweeps, key=lambda s: (s.plane_deg, s.theta_i_deg)))
 
 
 def _sweep(
-    data: ReportData,
-    numbers: tuple[int, int],
-    at: IntArray,
-    dphi_deg: float,
-    theta_r: FloatArray,
-) -> Sweep:
-    value, u = (column[at] for column in _shown(data))
+    data: ReportData, plane: int, incidence: int, at: IntArray, dphi_deg: float, theta_r: FloatArray
+) -> PlottedSweep:
+    value, u = (column[at] for column in _value_and_u(data))
     theta_i_deg, good = float(np.median(data.theta_i_deg[at])), ~data.flagged[at]
     grid = _grid(theta_r)
-    lines = [c.curve(theta_i_deg, dphi_deg, grid) for c in data.drawn if c.curve is not None]
+    lines = [c.curve(theta_i_deg, dphi_deg, grid) for c in data.plotted if c.curve is not None]
     if not data.has_brdf:
         lines = [_scaled(line, grid, theta_r[good], value[good]) for line in lines]
     lines = [np.where(np.isfinite(line), line, np.nan) for line in lines]
     measured = (grid >= theta_r[0]) & (grid <= theta_r[-1])
-    return Sweep(
-        plane=numbers[0],
-        incidence=numbers[1],
+    return PlottedSweep(
+        plane=plane,
+        incidence=incidence,
         theta_i_deg=theta_i_deg,
         dphi_deg=dphi_deg,
         theta_r_deg=theta_r,
@@ -224,12 +223,12 @@ def _sweep(
     )
 
 
-def _shown(data: ReportData) -> tuple[FloatArray, FloatArray]:
+def _value_and_u(data: ReportData) -> tuple[FloatArray, FloatArray]:
     return (data.brdf, data.u_brdf) if data.has_brdf else (data.radiance, data.u_radiance)
 
 
 def _folded(dphi_deg: FloatArray, theta_r_deg: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The same directions with dphi in -90..90, where theta_r changes its sign if need be."""
+    """The same directions with dphi in -90 to 90 degrees; theta_r changes its sign if needed."""
     with np.errstate(invalid="ignore"):
         around = np.mod(dphi_deg + 90.0 - _SAME_ANGLE_DEG, 360.0) - 90.0 + _SAME_ANGLE_DEG
         other = around > 90.0 + _SAME_ANGLE_DEG
@@ -237,7 +236,7 @@ def _folded(dphi_deg: FloatArray, theta_r_deg: FloatArray) -> tuple[FloatArray, 
 
 
 def _settings(angle_deg: FloatArray, usable: BoolArray) -> IntArray:
-    """Number of the setting that each usable angle belongs to, from the smallest; -1 elsewhere."""
+    """Number of each usable angle's setting, counted from the smallest angle; -1 elsewhere."""
     at = np.flatnonzero(usable)
     at = at[np.argsort(angle_deg[at], kind="stable")]
     numbers = np.full(len(angle_deg), -1, dtype=np.int64)
@@ -255,7 +254,7 @@ def _residuals(data: ReportData) -> FloatArray:
 
 
 def _grid(theta_r_deg: FloatArray) -> FloatArray:
-    """Where the lines are worked out: the measured angles, whole degrees between, and zero."""
+    """Angles at which the lines are computed: those measured, whole degrees between, and zero."""
     between = np.arange(np.ceil(theta_r_deg[0]), theta_r_deg[-1], _GRID_STEP_DEG)
     return np.unique(np.concatenate([theta_r_deg, between, [0.0]]))
 
@@ -263,7 +262,7 @@ def _grid(theta_r_deg: FloatArray) -> FloatArray:
 def _scaled(
     line: FloatArray, grid: FloatArray, theta_r_deg: FloatArray, value: FloatArray
 ) -> FloatArray:
-    """The line made to pass through the middle of the points, where their scale is unknown."""
+    """The line scaled to the points by the median ratio."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = value / np.interp(theta_r_deg, grid, line)
     ratio = ratio[np.isfinite(ratio)]
@@ -273,7 +272,7 @@ def _scaled(
 def _at_normal(
     theta_r_deg: FloatArray, value: FloatArray, grid: FloatArray, lines: list[FloatArray]
 ) -> float:
-    """The measured value at theta_r = 0, between its neighbours; else the model's; else NaN."""
+    """Measured value at theta_r = 0, interpolated; else that of the model; else NaN."""
     if len(value) and theta_r_deg[0] <= 0.0 <= theta_r_deg[-1]:
         found = float(np.interp(0.0, theta_r_deg, value))
     elif lines:

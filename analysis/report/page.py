@@ -1,6 +1,6 @@
-"""The report of a run: one HTML file that needs nothing else, to read on screen or on paper.
+"""HTML report of a run: one self-contained file, for the screen or for printing.
 
-`write_report` is all that others need. Every text from outside is escaped on its way in.
+The entry point is `write_report`. Every text from the record is escaped.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from analysis.report import charts
-from analysis.report.data import Candidate, Parameter, ReportData, Rows, Sweep, sweeps_of
+from analysis.report.data import Candidate, Parameter, PlottedSweep, ReportData, Rows, group_sweeps
 from analysis.report.style import CSS, format_value
 from instrument.record.reading import Preview
 from instrument.text.atomic_file import write_whole
@@ -25,19 +25,19 @@ _STATES = {
 }
 _NO_TILE = (
     "No white tile was measured, so there is no BRDF: the radiance is relative, in counts per "
-    "second of this camera, lamp and lens. Its shape can be trusted, its height means nothing."
+    "second of this camera, lamp and lens. Only its dependence on angle is meaningful."
 )
 _PNG_HEADER = struct.Struct(">8s4x4sII")
 
 
 def write_report(path: Path, data: ReportData) -> None:
-    """Write the report; a reader of `path` sees the old file or the whole new one, never a part."""
+    """Write the report atomically: `path` holds the old file or the complete new one."""
     write_whole(path, report_html(data))
 
 
 def report_html(data: ReportData) -> str:
-    """The report as the text of an HTML page; the same data give the same text."""
-    sweeps = sweeps_of(data)
+    """Return the report as an HTML page; the same data give the same text."""
+    sweeps = group_sweeps(data)
     body = [
         _head(data, sweeps),
         _verdict(data),
@@ -58,9 +58,9 @@ def report_html(data: ReportData) -> str:
     )
 
 
-def _text(words: str) -> str:
-    """Words from outside, escape_control_characters in HTML and in XML."""
-    visible = "".join(c if c.isprintable() or c in "\n\t\u00a0" else "\ufffd" for c in words)
+def _text(raw: str) -> str:
+    """Escape a text from the record for HTML and XML."""
+    visible = "".join(c if c.isprintable() or c in "\n\t\u00a0" else "\ufffd" for c in raw)
     return html.escape(visible)
 
 
@@ -68,7 +68,7 @@ def _number(value: float | None, form: str) -> str:
     return "—" if value is None or not math.isfinite(value) else format(value, form)
 
 
-def _head(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
+def _head(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
     lines = [f"<header>\n<h1>{_text(data.title)}</h1>"]
     if data.sample:
         lines.append(f'<p class="sample">Sample: <b>{_text(data.sample)}</b></p>')
@@ -77,7 +77,7 @@ def _head(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
     return "\n".join([*lines, f'<p class="soft">{_counts(data, sweeps)}</p>\n</header>'])
 
 
-def _counts(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
+def _counts(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
     incidences = {s.incidence: f"{round(s.theta_i_deg, 1):g}°" for s in sweeps}
     planes = {s.plane: f"{s.plane_deg:g}°" for s in sweeps}
     parts = [f"{len(data.flags)} geometries measured"]
@@ -97,7 +97,7 @@ def _verdict(data: ReportData) -> str:
     values = []
     if chosen is not None:
         found = ((_text(p.name), _value_of(p)) for p in chosen.parameters)
-        values = [_big(*pair) for pair in found]
+        values = [_term(*pair) for pair in found]
     return "\n".join(
         [
             f'<section id="verdict" class="verdict {kind}">',
@@ -110,7 +110,7 @@ def _verdict(data: ReportData) -> str:
     )
 
 
-def _big(label: str, value: str) -> str:
+def _term(label: str, value: str) -> str:
     return f"<div><dt>{label}</dt><dd>{value}</dd></div>"
 
 
@@ -134,24 +134,26 @@ def _attention(data: ReportData) -> str:
     return f'<section id="notes" class="attention notes"><b>Notes</b><ul>{items}</ul></section>'
 
 
-def _charts(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
+def _charts(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
     if not sweeps:
-        return '<h2 id="shape">Measured values</h2>\n<p>No geometry gave a value to draw.</p>'
+        return '<h2 id="shape">Measured values</h2>\n<p>No geometry has a value to plot.</p>'
     name = "BRDF" if data.has_brdf else "Radiance"
     quantity = "BRDF (1/sr)" if data.has_brdf else "radiance (counts/s)"
     return "\n".join(
         [
             '<h2 id="shape">Shape of the reflection</h2>',
             _figure(
-                charts.normalised_charts(sweeps), "normalised radiance", _shape_words(data, sweeps)
+                charts.normalised_charts(sweeps),
+                "normalised radiance",
+                _shape_caption(data, sweeps),
             ),
             f'<h2 id="brdf">{name} at each incidence</h2>',
-            _figure([charts.brdf_chart(sweeps, quantity)], quantity, _panel_words(data, sweeps)),
+            _figure([charts.brdf_chart(sweeps, quantity)], quantity, _panel_caption(data, sweeps)),
             f'<h2 id="polar">{name} around the sample</h2>',
             _figure(
                 [charts.polar_chart(sweeps, quantity)],
                 f"{quantity}, polar",
-                _polar_words(data, sweeps, quantity),
+                _polar_caption(data, sweeps, quantity),
             ),
         ]
     )
@@ -163,60 +165,60 @@ def _figure(drawings: list[str], label: str, caption: str) -> str:
     return f"<figure>\n{drawn}<figcaption>{caption}</figcaption>\n</figure>"
 
 
-def _shape_words(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
-    words = [
-        "Radiance divided by its value straight above the sample (θᵣ = 0), against the view "
-        "angle. Positive θᵣ is the lamp’s side. Bars: standard uncertainty u (k = 1), often "
-        "smaller than the dots.",
+def _shape_caption(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
+    caption = [
+        "Radiance relative to its value along the sample’s normal (θᵣ = 0), against the view "
+        "angle. Positive θᵣ is the lamp’s side. Error bars: standard uncertainty u (k = 1), often "
+        "smaller than the markers.",
     ]
     if any(s.in_plane for s in sweeps):
-        words.append("▼ marks the lamp’s direction, θᵣ = θᵢ.")
+        caption.append("▼ marks the lamp’s direction, θᵣ = θᵢ.")
     if any(not s.in_plane for s in sweeps):
-        words.append("Δφ is the azimuth of positive θᵣ, counted from the lamp’s.")
-    if data.drawn:
-        words.append(f"Lines: <b>{_text(data.drawn[0].name)}</b>{_scaled(data)}.")
+        caption.append("Δφ is the azimuth of positive θᵣ relative to the lamp’s.")
+    if data.plotted:
+        caption.append(f"Lines: <b>{_text(data.plotted[0].name)}</b>{_scaled(data)}.")
     if any(c.chosen and c.residuals is not None for c in data.candidates):
-        words.append(
-            "Below: (measured − model) / u, with the errors that points share (tile, lamp angle, "
-            "placement) taken out at their likeliest values; the grey band is ±2, where about "
-            "95 % of the dots belong. A pattern through many dots is no noise: the model is wrong."
+        caption.append(
+            "Below: residuals (measured − model) / u, less the most likely values of the errors "
+            "that points share (tile, lamp angle, placement). About 95 % should lie in the grey "
+            "band of ±2. A pattern over many points is not noise but a misfit of the model."
         )
-    return " ".join([*words, _mark_words(data)])
+    return " ".join([*caption, _marker_caption(data)])
 
 
 def _scaled(data: ReportData) -> str:
-    return "" if data.has_brdf else ", each scaled to its dots"
+    return "" if data.has_brdf else ", each scaled to its points"
 
 
-def _mark_words(data: ReportData) -> str:
-    words = "Crossed dots are flagged." if data.flagged.any() else ""
+def _marker_caption(data: ReportData) -> str:
+    caption = "Crosses: flagged points." if data.flagged.any() else ""
     left_out = ~data.fitted & ~data.flagged
     if left_out.any() and data.fitted.any():
-        words += " Hollow dots did not enter the fit."
-    return words.strip()
+        caption += " Open markers: points not in the fit."
+    return caption.strip()
 
 
-def _panel_words(data: ReportData, sweeps: tuple[Sweep, ...]) -> str:
+def _panel_caption(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
     kinds = ("Solid line", "Dashed", "Dotted")
-    drawn = [f"{kind}: <b>{_text(c.name)}</b>" for kind, c in zip(kinds, data.drawn, strict=False)]
-    if drawn:
-        drawn[0] += " (chosen)" if data.drawn[0].chosen else ""
-        drawn = [f"{'; '.join(drawn)}{_scaled(data)}."]
-    if len(sweeps) > charts.MOST_PANELS:
-        drawn.append(f"{charts.MOST_PANELS} of {len(sweeps)} sweeps are shown.")
-    if data.drawn and data.drawn[0].residuals is not None:
-        drawn.append("Dots may stand off a line together by an error that they share.")
-    return " ".join(["Bars: u (k = 1).", *drawn, _mark_words(data)])
+    models = data.plotted
+    lines = [f"{kind}: <b>{_text(c.name)}</b>" for kind, c in zip(kinds, models, strict=False)]
+    if lines:
+        lines[0] += " (chosen)" if models[0].chosen else ""
+        lines = [f"{'; '.join(lines)}{_scaled(data)}."]
+    if len(sweeps) > charts.MAX_PANELS:
+        lines.append(f"{charts.MAX_PANELS} of {len(sweeps)} sweeps are shown.")
+    if models and models[0].residuals is not None:
+        lines.append("Points may deviate from a line together, by an error that they share.")
+    return " ".join(["Error bars: u (k = 1).", *lines, _marker_caption(data)])
 
 
-def _polar_words(data: ReportData, sweeps: tuple[Sweep, ...], quantity: str) -> str:
-    words = (
-        f"The distance from the sample is the {quantity}, the direction is the camera’s: straight "
-        "up is θᵣ = 0, to the right is the lamp’s side. A matte (Lambertian) sample would give a "
-        "half circle."
+def _polar_caption(data: ReportData, sweeps: tuple[PlottedSweep, ...], quantity: str) -> str:
+    caption = (
+        f"Radius: {quantity}; angle: direction of the camera, with θᵣ = 0 at the top and the "
+        "lamp’s side on the right. A matte (Lambertian) sample would give a half circle."
     )
-    words += " Arrows come from the lamp." if any(s.in_plane for s in sweeps) else ""
-    return words + (" Flagged points are left out." if data.flagged.any() else "")
+    caption += " Arrows: direction of the light." if any(s.in_plane for s in sweeps) else ""
+    return caption + (" Flagged points are left out." if data.flagged.any() else "")
 
 
 def _candidates(data: ReportData) -> str:
@@ -228,31 +230,31 @@ def _candidates(data: ReportData) -> str:
         ("Model", "Parameters ± u (k = 1)", "#Residual, rms", "#Reduced χ²", "#ΔBIC"),
         cell="th",
     )
-    word = "✔ chosen" if data.verdict_kind == "adequate" else "best of these"
-    rows = "".join(_candidate(c, best, word) for c in data.ranked)
+    tag = "✔ chosen" if data.verdict_kind == "adequate" else "best candidate"
+    rows = "".join(_candidate(c, best, tag) for c in data.ranked)
     return (
         '<h2 id="candidates">Models compared</h2>\n'
         f'<div class="wide"><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>\n'
-        '<p class="soft">Reduced χ² near 1: the model agrees with the data within their '
-        "uncertainty. ΔBIC: how far a model stands behind the best one, every parameter "
-        "charged for. A bracket holds every value that the data allow (95 %).</p>"
+        '<p class="soft">Residual: relative to the mean. Reduced χ² near 1: the model agrees with '
+        "the data within their uncertainty. ΔBIC: difference from the lowest BIC, which includes a "
+        "penalty for each parameter. Brackets: 95 % interval.</p>"
     )
 
 
-def _candidate(candidate: Candidate, best_bic: float | None, word: str) -> str:
+def _candidate(candidate: Candidate, best_bic: float | None, tag: str) -> str:
     above = math.nan
     if candidate.bic is not None and best_bic is not None:
         above = candidate.bic - best_bic
-    tag = f'<br><span class="tag">{word}</span>' if candidate.chosen else ""
+    note = f'<br><span class="tag">{tag}</span>' if candidate.chosen else ""
     if not candidate.converged:
-        tag += f'<br><span class="soft">did not converge: {_text(candidate.message)}</span>'
+        note += f'<br><span class="soft">did not converge: {_text(candidate.message)}</span>'
     parameters = "".join(
         f'<span class="parameter"><span class="name">{_text(p.name)}</span> {_value_of(p)}</span>'
         for p in candidate.parameters
     )
     rms = candidate.rms_relative
     cells = (
-        _name(candidate) + tag,
+        _name(candidate) + note,
         parameters,
         "#" + (f"{_number(100 * rms, '.3g')} %" if math.isfinite(rms) else "—"),
         "#" + _number(candidate.reduced_chi2, ".3g"),
@@ -262,7 +264,7 @@ def _candidate(candidate: Candidate, best_bic: float | None, word: str) -> str:
 
 
 def _row(cells: Iterable[str], style: str = "", cell: str = "td") -> str:
-    """A table row of finished HTML; a cell that begins with # holds a number."""
+    """Table row of cells in HTML; a cell that begins with # is a number."""
     made = (
         f'<{cell} class="number">{c[1:]}</{cell}>' if c.startswith("#") else f"<{cell}>{c}</{cell}>"
         for c in cells
@@ -291,7 +293,7 @@ def _flagged(data: ReportData) -> str:
     head = _row(("#θᵢ", "#Δφ", "#θᵣ", "#Value ± u (k = 1)", "Flag"), cell="th")
     return (
         '<h2 id="flagged">Flagged points</h2>\n'
-        '<p class="soft">Drawn with a cross; those far off may lie outside a chart.</p>\n'
+        '<p class="soft">Marked with a cross; outliers may lie outside a chart.</p>\n'
         f'<div class="wide"><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>'
     )
 
@@ -299,7 +301,7 @@ def _flagged(data: ReportData) -> str:
 def _budget(data: ReportData) -> str:
     if not data.budget:
         return ""
-    head = _row(("Where it comes from", "#Relative u, median", "#Share of variance", ""), cell="th")
+    head = _row(("Source", "#Relative u, median", "#Share of variance", ""), cell="th")
     rows = "".join(
         _row((_text(name), f"#{_percent(u)}", f"#{_number(share, '.0f')} %", _bar(share)))
         for name, u, share in data.budget
@@ -328,9 +330,9 @@ def _pictures(previews: tuple[Preview, ...]) -> str:
     if not previews:
         return ""
     return (
-        '<h2 id="pictures">What the camera saw</h2>\n'
-        '<p class="soft">The outline is the window whose pixels were averaged: the same area of '
-        'the sample at every angle.</p>\n<div class="pictures">'
+        '<h2 id="pictures">Camera pictures</h2>\n'
+        '<p class="soft">Outline: the window of averaged pixels, which shows the same area of the '
+        'sample at every angle.</p>\n<div class="pictures">'
         + "".join(map(_picture, previews))
         + "</div>"
     )
@@ -341,7 +343,7 @@ def _picture(preview: Preview) -> str:
     size = _png_size(preview.png)
     if size is None:
         return f"<figure><p>This picture cannot be read.</p>{caption}</figure>"
-    # The centre of a pixel is at a whole number; in SVG a pixel begins there.
+    # Whole numbers are the centres of pixels in the record, and their edges in SVG.
     corners = " ".join(
         f"{x + 0.5:.2f},{y + 0.5:.2f}"
         for x, y in preview.polygon
@@ -358,7 +360,7 @@ def _picture(preview: Preview) -> str:
 
 
 def _png_size(png: bytes) -> tuple[int, int] | None:
-    """Width and height in pixels from a PNG's header; None where it is not one."""
+    """Width and height in pixels from the header of a PNG; None for other data."""
     if len(png) < _PNG_HEADER.size:
         return None
     signature, chunk, width, height = _PNG_HEADER.unpack_from(png)
@@ -375,7 +377,7 @@ def _facts(data: ReportData) -> str:
     )
     found = "".join(_fact(*table) for table in tables if table[2])
     return (
-        f'<h2 id="facts">How it was measured</h2>\n<div class="facts">{found}</div>'
+        f'<h2 id="facts">Measurement conditions</h2>\n<div class="facts">{found}</div>'
         if found
         else ""
     )

@@ -1,6 +1,6 @@
-"""How the report looks: colours and marks of the charts, values in words, the style sheet.
+"""Style of the report: colours and markers of the charts, number format, style sheet.
 
-Everything is made for the screen and for a black-and-white printer.
+Suitable for screens and for black-and-white printers.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 Dashes = str | tuple[float, tuple[float, ...]]
 
-# The palette of Okabe and Ito, which colour-blind readers can tell apart; yellow is left out.
+# Palette of Okabe and Ito, distinguishable by colour-blind readers, without yellow.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#AA4499", "#000000", "#B8860B", "#56B4E9")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "p")
 _DASHES: tuple[Dashes, ...] = (
@@ -36,7 +36,7 @@ _SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 10.0,
     "axes.titlesize": 10.5,
-    "axes.titley": 1.0,  # a place of its own: nothing needs to be measured to find one
+    "axes.titley": 1.0,  # fixed, which saves measuring texts to place the title
     "axes.grid": True,
     "axes.axisbelow": True,
     "grid.color": GRID,
@@ -59,7 +59,7 @@ _SETTINGS: dict[Any, Any] = {
 
 
 def style_of(incidence: int) -> tuple[str, str, Dashes]:
-    """Colour, marker and line style of an incidence, by its number."""
+    """Colour, marker and line style of the incidence with this number."""
     return (
         _COLOURS[incidence % len(_COLOURS)],
         _MARKERS[incidence % len(_MARKERS)],
@@ -68,9 +68,9 @@ def style_of(incidence: int) -> tuple[str, str, Dashes]:
 
 
 def svg_of(height_in: float, draw: Callable[[Figure], None], name: str) -> str:
-    """A figure as an SVG element whose ids begin with `name`: the same data, the same text.
+    """Draw a figure as an SVG element whose ids begin with `name`; reproducible byte by byte.
 
-    Matplotlib's settings are changed for the drawing only.
+    Matplotlib's settings are changed only while drawing.
     """
     import matplotlib as mpl
     from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -87,7 +87,7 @@ def svg_of(height_in: float, draw: Callable[[Figure], None], name: str) -> str:
 
 
 def _embedded(svg: str, name: str) -> str:
-    """The SVG without what a page has no use for, as wide as the page, its ids its own."""
+    """The SVG for use inside a page: without header and fixed size, with unique ids."""
     svg = svg[svg.index("<svg") :].replace("xlink:href=", "href=")
     head, end, body = svg.partition(">")
     head = re.sub(r' (width|height|xmlns:xlink)="[^"]*"', "", head)
@@ -95,26 +95,26 @@ def _embedded(svg: str, name: str) -> str:
 
 
 def format_value(value: float, u: float | None, unit: str = "") -> str:
-    """A value rounded to the two significant digits of its uncertainty: `20.013 ± 0.021 °`.
+    """Format a value rounded to two significant digits of its uncertainty: `20.013 ± 0.021 °`.
 
-    Without a usable uncertainty the value stands alone, with four significant digits.
+    Without a valid uncertainty: the value alone, with four significant digits.
     """
-    after = f"\u00a0{unit}" if unit else ""
+    suffix = f"\u00a0{unit}" if unit else ""
     if not math.isfinite(value):
         return "—"
     if u is None or not math.isfinite(u) or u <= 0:
-        return f"{value:.4g}{after}"
+        return f"{value:.4g}{suffix}"
     first = int(f"{u:.1e}".partition("e")[2])
     largest = int(f"{max(abs(value), u):e}".partition("e")[2])
     if first < -6 or largest > 6:
         scaled = format_value(value / 10.0**largest, u / 10.0**largest)
-        return f"({scaled})\u00a0×\u00a010{_raised(largest)}{after}"
+        return f"({scaled})\u00a0×\u00a010{_superscript(largest)}{suffix}"
     digits = 1 - first
     decimals = max(digits, 0)
-    return f"{round(value, digits):.{decimals}f} ± {round(u, digits):.{decimals}f}{after}"
+    return f"{round(value, digits):.{decimals}f} ± {round(u, digits):.{decimals}f}{suffix}"
 
 
-def _raised(power: int) -> str:
+def _superscript(power: int) -> str:
     return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 

@@ -5,12 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.data.acceptance import Acceptance, averaged_brdf
-from analysis.data.measurements import Measurements, SharedError, same_setting
+from analysis.data.measurements import Measurements, SharedError, setting_numbers
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
 
 # Oren and Nayar 1995, section 5: incidence 30, 45 and 60 degrees, .003 sr and .0009 sr, 6 ft.
-RIG = Acceptance(1828.8, 1500.0, 0.003, 0.0009, 20.0, 20.0)
+RIG = Acceptance(
+    beam_length_mm=1828.8,
+    lamp_distance_mm=1500.0,
+    source_solid_angle_sr=0.003,
+    receiver_solid_angle_sr=0.0009,
+    patch_width_mm=20.0,
+    patch_height_mm=20.0,
+)
 # White plaster, painted sandpaper, white sand; foam, towel, wood shavings (ks: theirs times 4).
 DIFFUSE = [(30.0, 0.9), (40.0, 0.8), (35.0, 0.8)]
 GLOSSY = [(20.0, 0.8, 0.076), (42.0, 0.75, 0.34), (26.0, 0.70, 0.172)]
@@ -37,7 +44,7 @@ def scan(
     """What a rig with those uncertainties would measure of a sample that obeys the model."""
     rng = np.random.default_rng(seed)
     theta_i, theta_r, dphi = scan_angles()
-    setting = same_setting(theta_i, dphi)
+    setting = setting_numbers(theta_i, dphi)
     true_i = theta_i + u_deg * rng.normal(size=3)[setting]
     # A stage repeats its error at every return to an angle.
     view = np.unique(theta_r, return_inverse=True)[1]
@@ -53,8 +60,9 @@ def scan(
         value = averaged_brdf(sample, true_i, true_r, true_phi, acceptance, 3)
     noisy = value * (1 + u_tile * rng.normal()) * (1 + u_relative * rng.normal(size=value.size))
     return Measurements(
-        theta_i, theta_r, dphi, noisy, u_relative * np.abs(value),
-        lamp_setting=setting, shared=(SharedError.of_all("white tile", u_tile, value.size),),
+        theta_i_deg=theta_i, theta_r_deg=theta_r, dphi_deg=dphi,
+        brdf=noisy, u_random=u_relative * np.abs(value), lamp_setting=setting,
+        shared=(SharedError.common_to_all("white tile", u_tile, value.size),),
         u_theta_i_deg=u_deg, u_theta_r_deg=u_deg, u_dphi_deg=u_deg,
     )  # fmt: skip
 
