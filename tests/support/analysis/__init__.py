@@ -1,0 +1,1 @@
+"""Helpers for the tests of the analysis: seeded scans, tables as text, report data."""
