@@ -8,6 +8,8 @@ candidate 35 ms; lmfit, given the true values to start from and asked for the fu
 
 from __future__ import annotations
 
+import time
+
 import lmfit
 import numpy as np
 import pytest
@@ -21,8 +23,14 @@ from instrument.geometry import FloatArray, Geometry
 from tests.support.cpu_time import cpu_seconds
 
 THETA_I = np.repeat([15.0, 30.0, 45.0, 60.0], 50)
+
+
 THETA_R = np.tile(np.linspace(-75, 75, 50), 4)
+
+
 GEOMETRY = Geometry.from_degrees(theta_i=THETA_I, theta_r=THETA_R)
+
+
 TRUTH = {"albedo": 0.8, "sigma_deg": 25.0}
 
 
@@ -76,3 +84,16 @@ def test_the_ladder_and_an_exact_candidate_cost_a_few_of_lmfit_s_fits(scan: Meas
 
     assert cpu_seconds(fit_exact, 2) < 100 * ruler
     assert exact[-1].converged
+
+
+def test_speed_of_the_functional_model() -> None:
+    rng = np.random.default_rng(0)
+    n = 50_000
+    geometry = Geometry.from_degrees(
+        theta_i=rng.uniform(0, 85, n), theta_r=rng.uniform(0, 85, n), dphi=rng.uniform(0, 360, n)
+    )
+    start = time.perf_counter()
+    found = MODELS["oren_nayar"].brdf(geometry, albedo=0.8, sigma_deg=30)
+    took = time.perf_counter() - start
+    assert took / n < 2e-6  # 0.15e-6 on a quiet machine; this only notices a blunder
+    assert np.all(found > 0)

@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.choice.choice import choose
-from analysis.choice.cross_validation import MOST_FOLDS, folds, held_out
+from analysis.choice.cross_validation import MAX_FOLDS, folds, held_out_error
 from analysis.data.measurements import Measurements
 from analysis.data.sweeps import signed_view
-from analysis.fit.fit import first_fit
+from analysis.fit.first_fit import first_fit
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
-from tests.support.seeded_scan import scan, scan_angles
+from tests.support.analysis.seeded_scan import scan, scan_angles
 
 VIEWS = np.linspace(-80, 80, 33)
 GLOSS = {"albedo": 0.75, "sigma_deg": 25.0, "ks": 0.2}
@@ -35,7 +35,7 @@ def test_each_point_is_left_out_once_and_never_all(points: list[tuple[int, int, 
     theta_i, theta_r, dphi = np.array(points, dtype=np.float64).T
     left_out = folds(Measurements.bare(10 * theta_i, 10 * theta_r, dphi, 0.2))
     assert len(left_out) != 1
-    assert len(left_out) <= MOST_FOLDS
+    assert len(left_out) <= MAX_FOLDS
     if left_out:
         assert np.sum(left_out, axis=0).tolist() == [1] * len(points)
         assert all(0 < np.sum(fold) < len(points) for fold in left_out)
@@ -45,7 +45,7 @@ def test_each_point_is_left_out_once_and_never_all(points: list[tuple[int, int, 
 def test_an_incidence_is_left_out_whole(count: int) -> None:
     m = sweeps_of(*np.linspace(0, 75, count))
     left_out = folds(m)
-    assert len(left_out) == min(count, MOST_FOLDS)
+    assert len(left_out) == min(count, MAX_FOLDS)
     for fold in left_out:
         for theta_i in np.unique(m.theta_i_deg):
             assert np.ptp(fold[m.theta_i_deg == theta_i].astype(int)) == 0
@@ -57,7 +57,7 @@ def test_an_incidence_is_left_out_whole(count: int) -> None:
 def test_of_one_or_two_incidences_blocks_of_view_are_left_out(incidences: tuple[float]) -> None:
     m = sweeps_of(*incidences)
     left_out = folds(m)
-    assert len(left_out) == MOST_FOLDS
+    assert len(left_out) == MAX_FOLDS
     reach = [(float(m.theta_r_deg[f].min()), float(m.theta_r_deg[f].max())) for f in left_out]
     assert reach[0][0] == -80
     assert reach[-1][1] == 80
@@ -97,7 +97,7 @@ def test_of_one_sweep_and_a_few_points_beside_it_the_sweep_is_not_left_out(
     noise = 1 + 2e-3 * np.random.default_rng(3).normal(size=99)
     m = Measurements.bare(theta_i, theta_r, 0.0, value * noise, 2e-3 * value)
     left_out = folds(m)
-    assert len(left_out) == MOST_FOLDS
+    assert len(left_out) == MAX_FOLDS
     assert max(np.sum(fold) for fold in left_out) < 30
     assert np.all(np.diff([np.mean(signed_view(m)[fold]) for fold in left_out]) > 0)
     found = choose(m, models=["oren_nayar_qualitative", "oren_nayar+torrance_sparrow"])
@@ -112,7 +112,7 @@ def test_one_view_angle_leaves_nothing_out() -> None:
 def foretold(name: str, m: Measurements) -> float:
     """chi2 of the points that were left out of the model's fits."""
     fitted = first_fit(MODELS[name], m)
-    return held_out(m, fitted.problem, fitted.solution.x, folds(m))
+    return held_out_error(m, fitted.problem, fitted.solution.x, folds(m))
 
 
 def score(true: str, other: str, truth: dict[str, float], *, one: bool = False) -> FloatArray:
@@ -183,4 +183,4 @@ def test_one_outlier_counts_once() -> None:
     value[40] += 0.1
     m = Measurements.bare(theta_i, theta_r, dphi, value, 1e-3)
     found = first_fit(MODELS["lambert"], m)
-    assert 100 < held_out(m, found.problem, found.solution.x, folds(m)) < 100 + 96 * 100 / 64
+    assert 100 < held_out_error(m, found.problem, found.solution.x, folds(m)) < 100 + 96 * 100 / 64

@@ -1,67 +1,17 @@
-"""Structure in residuals: sweeps as they were driven, runs of one sign, and where a model fails."""
+"""Runs test of residuals: runs of one sign, and the stretches where a model fits worst."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from analysis.choice.runs_test import Stretch, failures, runs_probability
+from analysis.choice.runs_test import Stretch, runs_probability, worst_stretches
 from analysis.data.measurements import Measurements
-from analysis.data.sweeps import in_plane, signed_view, sweeps
+from analysis.data.sweeps import sweeps
 from instrument.geometry import FloatArray, Geometry
-from tests.support.seeded_scan import scan_angles
-
-
-def three_sweeps(order: FloatArray | None = None) -> Measurements:
-    """96 points; `order`: the order in which they were measured."""
-    theta_i, theta_r, dphi = scan_angles()
-    chosen = np.arange(theta_i.size) if order is None else np.argsort(order)
-    return Measurements.bare(theta_i[chosen], theta_r[chosen], dphi[chosen], 0.2, 1e-3)
-
-
-def test_sweeps_are_by_incidence_and_plane_with_rising_view() -> None:
-    m = three_sweeps(np.random.default_rng(1).uniform(size=96))
-    found = sweeps(m)
-    assert [(s.theta_i_deg, s.dphi_deg, s.points.size) for s in found] == [
-        (30, 0, 32),
-        (45, 0, 32),
-        (60, 0, 32),
-    ]
-    for sweep in found:
-        assert np.all(np.diff(m.theta_r_deg[sweep.points]) > 0)
-        assert np.all(m.theta_i_deg[sweep.points] == sweep.theta_i_deg)
-
-
-@pytest.mark.parametrize("plane", [0.0, 40.0, 179.0])
-@pytest.mark.parametrize("off", [0.0, 1e-4, -1e-4, 1e-12, -1e-12])
-def test_both_forms_of_a_geometry_are_one_sweep(plane: float, off: float) -> None:
-    """Also where an azimuth is off by rounding: 179.9999 degrees is the far half of 0's plane."""
-    view = np.array([-60.0, -30.0, 0.0, 20.0, 50.0])
-    signed = Measurements.bare(45.0, view, plane, 0.2)
-    behind = np.where(view < 0, plane + 180 + off, plane)
-    unsigned = Measurements.bare(45.0, np.abs(view), np.mod(behind, 360), 0.2)
-    far = Measurements.bare(45.0, -view, plane - 180 + off, 0.2)
-    for m in (signed, unsigned, far):
-        (sweep,) = sweeps(m)
-        assert (sweep.dphi_deg, sweep.points.tolist()) == (plane, [0, 1, 2, 3, 4])
-        assert signed_view(m).tolist() == view.tolist()
-
-
-@given(
-    theta_r=st.floats(-90.0, 90.0),
-    dphi=st.integers(-720_000, 720_000).map(lambda n: n / 1000),
+from tests.support.analysis.seeded_scan import (
+    three_sweeps,
 )
-def test_in_plane_names_the_same_direction(theta_r: float, dphi: float) -> None:
-    m = Measurements.bare(30.0, [theta_r], dphi, 0.2)
-    plane, view = in_plane(m)
-    assert 0 <= plane[0] < 180
-    here = Geometry.from_degrees(theta_i=30.0, theta_r=view, dphi=plane)
-    assert here.theta_r_deg == pytest.approx(m.geometry.theta_r_deg)
-    if abs(theta_r) > 1e-6:
-        turn = np.radians(here.dphi_deg - m.geometry.dphi_deg)
-        assert np.cos(turn) == pytest.approx(1, abs=1e-10)
 
 
 def test_a_point_alone_is_no_sweep() -> None:
@@ -121,7 +71,7 @@ def bump(m: Measurements, height: float) -> FloatArray:
 @pytest.mark.parametrize("height", [4.0, -4.0])
 def test_the_failing_stretch_is_named(height: float) -> None:
     m = three_sweeps()
-    worst, *others = failures(m, bump(m, height))
+    worst, *others = worst_stretches(m, bump(m, height))
     assert worst[:2] == (45, 0)
     # A neighbour of the same sign may belong to it.
     assert worst.from_deg in (5, 10)
@@ -137,9 +87,9 @@ def test_the_worst_comes_first_and_what_noise_leaves_is_not_named() -> None:
     m = three_sweeps()
     r = bump(m, 4.0)
     r[m.theta_i_deg == 60] -= 2.0
-    assert [s.theta_i_deg for s in failures(m, r)] == [60, 45]
-    assert len(failures(m, r, most=1)) == 1
-    calm = failures(m, 0.5 * (-1.0) ** np.arange(m.size))
+    assert [s.theta_i_deg for s in worst_stretches(m, r)] == [60, 45]
+    assert len(worst_stretches(m, r, most=1)) == 1
+    calm = worst_stretches(m, 0.5 * (-1.0) ** np.arange(m.size))
     assert len(calm) == 1  # the worst is named in any case
 
 
@@ -149,11 +99,11 @@ def test_a_point_set_aside_does_not_cut_a_stretch() -> None:
     for height in (4.0, -4.0):
         r = bump(m, height)
         r[(m.theta_i_deg == 45) & (m.theta_r_deg == 20)] = 0
-        (worst,) = failures(m, r)
+        (worst,) = worst_stretches(m, r)
         assert worst.from_deg <= 10
         assert worst.to_deg >= 30
         assert abs(worst.mean) > 2.5
-    assert failures(m, np.zeros(m.size)) == []
+    assert worst_stretches(m, np.zeros(m.size)) == []
 
 
 @pytest.mark.parametrize(
@@ -171,7 +121,7 @@ def test_scattered_points_are_named_where_they_are(
     """One form for all: dphi below 180 degrees, theta_r signed in that plane."""
     m = Measurements.bare([10.0, 20.0, 30.0], [15.0, theta_r, 25.0], [70.0, dphi, 110.0], 0.2)
     assert sweeps(m) == []
-    (worst,) = failures(m, np.array([0.1, -9.0, 0.1]))
+    (worst,) = worst_stretches(m, np.array([0.1, -9.0, 0.1]))
     assert worst == Stretch(20, named[0], named[1], named[1], -9, 9)
     here = Geometry.from_degrees(theta_i=20, theta_r=worst.from_deg, dphi=worst.dphi_deg)
     there = m.geometry

@@ -12,11 +12,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.choice.symmetry_test import UNLIKELY, Symmetry, symmetry
+from analysis.choice.symmetry_test import Symmetry, symmetry
 from analysis.data.measurements import Measurements
+from analysis.fit.criteria import SIGNIFICANCE
 from analysis.models import MODELS
 from instrument.geometry import Brdf, FloatArray, Geometry
-from tests.support.seeded_scan import scan
+from tests.support.analysis.seeded_scan import scan
 
 PLASTIC = {"single_scattering_albedo": 0.9, "n": 1.5}
 SMOOTH: list[tuple[str, dict[str, float]]] = [("lambert", {"albedo": 0.8}), ("wolff", PLASTIC)]
@@ -58,7 +59,7 @@ def test_a_smooth_surface_is_called_smooth(name: str, truth: dict[str, float]) -
     """Of 1000 scans one is not: the level is 0.001; all uncertainties as stated are at work."""
     count = 200 if name == "lambert" else 60
     found = [judged(name, seed, **truth) for seed in range(count)]
-    assert Counter(f.says for f in found)["smooth"] >= 0.99 * count
+    assert Counter(f.outcome for f in found)["smooth"] >= 0.99 * count
     assert found[0].pairs == 45
     probabilities = np.array([f.probability for f in found])
     assert np.mean(probabilities < 0.05) < 0.12
@@ -69,7 +70,7 @@ def test_a_smooth_surface_is_called_smooth(name: str, truth: dict[str, float]) -
 def test_a_rough_surface_is_brighter_on_the_lamp_s_side(sigma_deg: float) -> None:
     for seed in range(20):
         found = judged("oren_nayar", seed, albedo=0.8, sigma_deg=sigma_deg)
-        assert found.says == "rough"
+        assert found.outcome == "rough"
         assert found.asymmetry > 0.1
         assert found.probability < 1e-9
         assert "lamp's side brighter" in str(found)
@@ -79,7 +80,7 @@ def test_a_rough_surface_is_brighter_on_the_lamp_s_side(sigma_deg: float) -> Non
 def test_gloss_is_brighter_on_the_mirror_side(sigma_deg: float) -> None:
     for seed in range(20):
         found = judged("lambert+torrance_sparrow", seed, albedo=0.6, sigma_deg=sigma_deg, ks=0.1)
-        assert found.says == "rough"
+        assert found.outcome == "rough"
         assert found.asymmetry < -0.1
         assert "mirror side brighter" in str(found)
 
@@ -133,15 +134,15 @@ def test_view_angles_that_are_off_alike_by_their_u_are_no_roughness(
                 "wolff", PLASTIC, seed,
                 step_deg=step_deg, off_deg=sign * u_deg, u_deg=u_deg, turned=turned,
             )  # fmt: skip
-            assert symmetry(m, smooth, 0.0).says == "smooth"
+            assert symmetry(m, smooth, 0.0).outcome == "smooth"
     unknown = dense("wolff", PLASTIC, 0, step_deg=step_deg, off_deg=1.0)
-    assert symmetry(unknown, smooth, 0.0).says == "rough"
+    assert symmetry(unknown, smooth, 0.0).outcome == "rough"
 
 
 def test_large_errors_of_angles_do_not_hide_roughness() -> None:
     truth = {"albedo": 0.8, "sigma_deg": 20.0}
     m = dense("oren_nayar", truth, 0, u_deg=1.0)
-    assert symmetry(m, brdf_of("oren_nayar", truth), 0.0).says == "rough"
+    assert symmetry(m, brdf_of("oren_nayar", truth), 0.0).outcome == "rough"
 
 
 @pytest.mark.parametrize(("name", "truth"), SMOOTH)
@@ -152,10 +153,10 @@ def test_without_stated_u_the_fit_s_noise_serves(name: str, truth: dict[str, flo
         bare = Measurements.bare(m.theta_i_deg, m.theta_r_deg, m.dphi_deg, m.brdf)
         noise = 2e-3 * float(np.mean(m.brdf))
         found.append(symmetry(bare, brdf_of(name, truth), noise))
-    assert Counter(f.says for f in found)["smooth"] >= 98
+    assert Counter(f.outcome for f in found)["smooth"] >= 98
     rough = dense("oren_nayar", {"albedo": 0.8, "sigma_deg": 20.0}, 0)
     bare = Measurements.bare(rough.theta_i_deg, rough.theta_r_deg, rough.dphi_deg, rough.brdf)
-    assert symmetry(bare, brdf_of("lambert", {"albedo": 0.7}), 1e-3).says == "rough"
+    assert symmetry(bare, brdf_of("lambert", {"albedo": 0.7}), 1e-3).outcome == "rough"
 
 
 def test_the_probability_is_that_of_chi2() -> None:
@@ -164,5 +165,5 @@ def test_the_probability_is_that_of_chi2() -> None:
     m = Measurements.bare(45.0, [-30.0, 30.0], 0.0, [0.2, 0.2 + 2 * u * np.sqrt(2)], u)
     found = symmetry(m, lambda g: np.full(g.shape, 0.2), 0.0)
     assert found.probability == pytest.approx(0.0455, abs=1e-4)
-    assert found.probability > UNLIKELY
-    assert found.says == "smooth"
+    assert found.probability > SIGNIFICANCE
+    assert found.outcome == "smooth"

@@ -10,13 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.data.acceptance import Acceptance, averaged_brdf, disc_rule, radiance, rings_each
+from analysis.data.acceptance import Acceptance, averaged_brdf, disc_rule, radiance, required_rings
 from analysis.models import MODELS
 from instrument.config.load import Loaded
 from instrument.geometry import FloatArray, Geometry, camera_direction, lamp_direction
+from tests.support.analysis.seeded_scan import RIG
 
-# Beam of 6 ft, .003 sr and .0009 sr: Oren and Nayar 1995, section 5.
-RIG = Acceptance(1828.8, 1500.0, 0.003, 0.0009, 20.0, 20.0)
 THETA_I = np.array([30.0, 45.0, 60.0, 0.0])
 THETA_R = np.array([-70.0, -45.0, 55.0, 20.0])
 DPHI = np.array([0.0, 0.0, 40.0, 0.0])
@@ -73,7 +72,13 @@ def test_a_small_rig_measures_the_plain_brdf() -> None:
     plain = rough(Geometry.from_degrees(theta_i=THETA_I, theta_r=THETA_R, dphi=DPHI))
     errors = []
     for part in (1.0, 0.1, 0.01):
-        small = Acceptance(1828.8, 1500, 0.003 * part, 0.0009 * part, 20 * part, 20 * part)
+        small = replace(
+            RIG,
+            source_solid_angle_sr=0.003 * part,
+            receiver_solid_angle_sr=0.0009 * part,
+            patch_width_mm=20 * part,
+            patch_height_mm=20 * part,
+        )
         found = averaged_brdf(rough, THETA_I, THETA_R, DPHI, small, 3)
         errors.append(np.max(np.abs(found / plain - 1)))
     assert errors[0] > 1e-3  # it matters for the rig as it is
@@ -152,13 +157,13 @@ def test_no_light_is_an_error() -> None:
 
 
 def test_needed_rings_reaches_its_tolerance() -> None:
-    assert rings_each(lambert, THETA_I, THETA_R, DPHI, RIG).max() == 0
-    rings = int(rings_each(rough, THETA_I, THETA_R, DPHI, RIG).max())
+    assert required_rings(lambert, THETA_I, THETA_R, DPHI, RIG).max() == 0
+    rings = int(required_rings(rough, THETA_I, THETA_R, DPHI, RIG).max())
     assert 1 <= rings <= 4
     found = averaged_brdf(rough, THETA_I, THETA_R, DPHI, RIG, rings)
     dense = averaged_brdf(rough, THETA_I, THETA_R, DPHI, RIG, 6)
     np.testing.assert_allclose(found, dense, rtol=3e-4)
-    assert rings_each(rough, THETA_I, THETA_R, DPHI, RIG, tolerance=1e-12, most=2).max() == 2
+    assert required_rings(rough, THETA_I, THETA_R, DPHI, RIG, tolerance=1e-12, most=2).max() == 2
 
 
 def test_from_the_configuration(demo: Loaded) -> None:

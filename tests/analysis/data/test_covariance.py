@@ -1,4 +1,4 @@
-"""Errors that points of a scan share: the drift checks' noise, and thousands of columns at once."""
+"""Covariance of measured points: whitening, shared errors, and thousands of columns."""
 
 from __future__ import annotations
 
@@ -8,84 +8,84 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from acquisition.measure.drift import rate
-from acquisition.results.reduction import DRIFT, reduce
-from analysis.data.covariance import Covariance
-from instrument.config.load import Loaded
-from instrument.record.reading import Check, Reading
-from instrument.record.record import Record
-from tests.support.scans import small_scan
-from tests.support.stopped_scan import scan
+from analysis.data.covariance import Covariance, full_covariance, independent_covariance
+from analysis.data.measurements import Measurements, SharedError
+from analysis.models import MODELS
+from instrument.geometry import FloatArray, Geometry
+from tests.support.analysis.seeded_scan import (
+    scan,
+)
 
 
-@pytest.fixture(scope="module")
-def small() -> Loaded:
-    return small_scan("paper_1995")  # the lamp is set by hand: two blocks, each with its checks
-
-
-@pytest.fixture(scope="module")
-def resumed(
-    small: Loaded, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[list[Reading], list[Check]]:
-    """A scan that was stopped in its first block and went on; the check then says: jumped."""
-
-    with Record.create(tmp_path_factory.mktemp("resumed") / "run", {}) as record:
-        scan(small, record, upto=4)
-        scan(small, record)
-        return record.readings(), [replace(check, jumped=True) for check in record.checks()]
-
-
-def noisier(reading: Reading, by_u: float) -> Reading:
-    return replace(reading, signal_dn=reading.signal_dn + by_u * reading.u_noise_dn)
-
-
-@pytest.mark.parametrize("jumped", [False, True])
-def test_the_drift_checks_noise_is_what_changing_each_of_them_does(
-    small: Loaded, resumed: tuple[list[Reading], list[Check]], jumped: bool
-) -> None:
-    """Each check moved by a part of its u, the points reduced again: their covariance, (N, N)."""
-    readings, checks = resumed
-    assert len(checks) == 1
-    checks = checks if jumped else []
-    found = reduce(readings, small.protocol, checks)
-    step, count = 1e-4, 0
-    expected = np.zeros((len(found.points), len(found.points)))
-    for n, reading in enumerate(readings):
-        if reading.kind == "drift":
-            other = [*readings[:n], noisier(reading, step), *readings[n + 1 :]]
-            change = reduce(other, small.protocol, checks).radiance / found.radiance - 1
-            expected, count = expected + np.outer(change, change) / step**2, count + 1
-    for check in checks:
-        other_check = replace(check, reading=noisier(check.reading, step))
-        change = reduce(readings, small.protocol, [other_check]).radiance / found.radiance - 1
-        expected, count = expected + np.outer(change, change) / step**2, count + 1
-    assert count == 6 + len(checks)  # three a block
-    errors = [error for error in found.shared if error.name == DRIFT]
-    stated = sum(
-        np.outer(e.u_relative, e.u_relative) * (e.group[:, np.newaxis] == e.group) for e in errors
+def test_whitening_gives_the_chi2_of_the_full_matrix() -> None:
+    rng = np.random.default_rng(3)
+    C = Covariance(rng.uniform(0.5, 2, 20), rng.normal(size=(20, 4)))
+    r = rng.normal(size=20)
+    white = C.whiten(r)
+    assert white @ white == pytest.approx(r @ np.linalg.solve(C.matrix(), r), rel=1e-12)
+    np.testing.assert_allclose(
+        C.whiten(C.matrix()) @ C.whiten(np.eye(20)).T, np.eye(20), atol=1e-10
     )
-    np.testing.assert_allclose(stated, expected, rtol=2e-3, atol=1e-3 * expected.max())
+    np.testing.assert_allclose(C.u_total**2, np.diag(C.matrix()), rtol=1e-12)
 
 
-def test_without_usable_checks_there_is_no_drift_noise(
-    small: Loaded, resumed: tuple[list[Reading], list[Check]]
-) -> None:
-    readings = [replace(r, flags="saturated") if r.kind == "drift" else r for r in resumed[0]]
-    assert DRIFT not in reduce(readings, small.protocol, ()).parts
+def test_the_pulls_are_the_likeliest_shared_errors() -> None:
+    """Against the normal equations of points and shared errors taken together."""
+    rng = np.random.default_rng(5)
+    C = Covariance(rng.uniform(0.5, 2, 20), rng.normal(size=(20, 4)))
+    r = rng.normal(size=20)
+    weighted = C.common.T / C.variance
+    expected = np.linalg.solve(weighted @ C.common + np.eye(4), weighted @ r)
+    assert C.pulls(r) == pytest.approx(expected, rel=1e-9)
 
 
-def test_levels_are_those_of_the_checks(resumed: tuple[list[Reading], list[Check]]) -> None:
-    from acquisition.measure.drift import Drift
+def test_shared_errors_are_where_they_belong() -> None:
+    m = scan("oren_nayar", 1, albedo=0.8, sigma_deg=30)
+    reading = SharedError("reading", np.full(m.size, 0.002), m.lamp_setting)
+    m = replace(m, shared=(*m.shared, reading))
 
-    made = [r for r in resumed[0] if r.kind == "drift" and r.block == 1]
-    drift = Drift.of(resumed[0], 1)
-    times_s = np.array([r.time_s for r in made])
-    middle_s = (times_s[:-1] + times_s[1:]) / 2
-    before, share = drift.interpolation(np.concatenate([times_s, middle_s]))
-    assert before.tolist() == [0, 1, 2, 0, 1]
-    assert share == pytest.approx([0, 0, 0, 0.5, 0.5])
-    level = [rate(r) / rate(made[0]) for r in made]
-    assert drift.at(float(middle_s[0])) == pytest.approx((level[0] + level[1]) / 2)
+    def smooth(geometry: Geometry) -> FloatArray:
+        return MODELS["oren_nayar"].brdf(geometry, albedo=0.8, sigma_deg=30)
+
+    f = smooth(m.geometry)
+    C = full_covariance(m, smooth).matrix()
+    step = 1e-4
+    up = smooth(Geometry.from_degrees(theta_i=m.theta_i_deg + step, theta_r=m.theta_r_deg))
+    down = smooth(Geometry.from_degrees(theta_i=m.theta_i_deg - step, theta_r=m.theta_r_deg))
+    slope = (up - down) / (2 * step)
+    a, b, far = 3, 5, m.size - 1  # two points of one lamp setting, and one of another
+    tile = 0.005**2
+    assert C[a, far] == pytest.approx(tile * f[a] * f[far], rel=1e-9)
+    shared_ab = (tile + 0.002**2) * f[a] * f[b] + 0.02**2 * slope[a] * slope[b]
+    assert C[a, b] == pytest.approx(shared_ab, rel=1e-4)
+
+
+def test_a_shared_error_may_raise_one_point_and_lower_another() -> None:
+    placement = SharedError("placement", np.array([0.01, -0.02, 0.03]), np.array([0, 0, 1]))
+    m = replace(Measurements.bare(30.0, [0.0, 20.0, 40.0], 0.0, 0.2, 0.001), shared=(placement,))
+    C = full_covariance(m, lambda g: np.full(g.shape, 0.2)).matrix()
+    expected = np.diag([1e-6] * 3) + 0.04 * np.array(
+        [[1e-4, -2e-4, 0], [-2e-4, 4e-4, 0], [0, 0, 9e-4]]
+    )
+    np.testing.assert_allclose(C, expected, atol=1e-15)
+
+
+def test_angle_errors_at_the_edges_of_the_domain() -> None:
+    m = replace(
+        Measurements.bare([0.0, 0.0, 90.0, 45.0], [-90.0, 0.0, 40.0, 90.0], 0.0, 0.2, 0.001),
+        u_theta_i_deg=0.5, u_theta_r_deg=0.5, u_dphi_deg=0.5,
+    )  # fmt: skip
+    model = MODELS["oren_nayar"]
+    C = full_covariance(m, lambda g: model.brdf(g, albedo=0.8, sigma_deg=30))
+    assert np.all(np.isfinite(C.matrix()))
+    assert np.all(C.u_total < 0.01)
+
+
+def test_the_covariance_needs_a_stated_u() -> None:
+    m = Measurements.bare(30, [0, 20], 0, 0.2)
+    assert independent_covariance(m).u_total.tolist() == [1, 1]
+    with pytest.raises(ValueError, match="u_random is not stated"):
+        full_covariance(m, lambda g: np.ones(g.shape))
 
 
 def test_a_sparse_covariance_is_the_full_one() -> None:
@@ -94,7 +94,7 @@ def test_a_sparse_covariance_is_the_full_one() -> None:
     variance, residual = rng.uniform(0.5, 2, 60), rng.normal(size=60)
     full, sparse = Covariance(variance, common), Covariance(variance, csr_array(common))
     good = rng.random(60) < 0.7
-    for one, other in ((full, sparse), (full.of(good), sparse.of(good))):
+    for one, other in ((full, sparse), (full.subset(good), sparse.subset(good))):
         r = residual[: one.variance.size]
         np.testing.assert_allclose(other.whiten(r), one.whiten(r), atol=1e-9)
         np.testing.assert_allclose(other.pulls(r), one.pulls(r), atol=1e-9)

@@ -1,4 +1,4 @@
-"""The CUReT reader: the published tables if they are at hand, and made-up ones of the same form."""
+"""CUReT reader: the published tables where present, and small ones in the same format."""
 
 from __future__ import annotations
 
@@ -13,30 +13,15 @@ from analysis.data.curet import Curet, read_curet
 from analysis.fit.fit import fit
 from analysis.models import MODELS
 from instrument.errors import InputError
+from tests.support.analysis.curet_texts import TABLE, VALUES
 from tests.support.paths import ROOT
 
 PUBLISHED = ROOT.parent / "shared" / "data" / "curet"
+
+
 published = pytest.mark.skipif(
     not PUBLISHED.is_dir(), reason="the CUReT tables are not in ../shared/data/curet"
 )
-
-# Directions: camera on the lamp's side; mirror; grazing, printed past pi/2; 0.3 and 1.2 rad.
-TABLE = """\
-1  0.500000  -1.570796  0.400000  -1.570796
-2  0.400000   3.141593  0.400000   0.000000
-3  1.570797   0.500000  0.000000   0.000000
-4  0.300000   1.000000  1.200000   0.250000
-"""
-VALUES = """\
-1  0.200  0.100  0.000  0.050
-2  0.300 -0.010  0.250  0.125
-7  0.000 -0.010 -0.010  0.000
-"""
-
-
-@pytest.fixture(autouse=True)
-def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def write(table: str = TABLE, values: str = VALUES) -> Path:
@@ -88,6 +73,8 @@ def test_comments_blank_lines_and_crlf() -> None:
 
 
 THETA = "allowed: a number from 0 to 1.570796 rad"
+
+
 # What to replace in TABLE, by what, and the whole message, counted by hand.
 TABLE_MISTAKES = {
     "text": ("0.500000  -1.57", "x.500000  -1.57", f"1:4: theta_v: 'x.500000' is text; {THETA}"),
@@ -159,12 +146,12 @@ VALUE_MISTAKES = {
     "sample not whole": (
         "7  0",
         "x  0",
-        "3:1: sample: 'x' is no whole number; allowed: the sample's number",
+        "3:1: sample: 'x' is not a whole number; allowed: the sample's number",
     ),
     "sample double": (
         "7  0",
         "1  0",
-        "3:1: sample: 1 stands already in line 1; allowed: each sample once",
+        "3:1: sample: 1 is already in line 1; allowed: each sample once",
     ),
     "sample unknown": ("1  0.2", "3  0.2", "1:1: sample: 1 is not in this file; allowed: 2-3, 7"),
     "empty": (VALUES, "\n", "1:1: no sample; allowed: a row `sample v1 v2 ...` for each material"),

@@ -18,18 +18,63 @@ import pytest
 
 from analysis.choice.choice import choose
 from analysis.choice.ladder import LADDER, physics
-from analysis.data.covariance import independent
+from analysis.data.covariance import independent_covariance
 from analysis.data.measurements import Measurements
 from analysis.fit.fit import FitResult, fit
 from analysis.fit.problem import Problem
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
+from tests.support.analysis.seeded_scan import (
+    RIG,
+    scan,
+)
+
+
+def test_the_lobe_of_a_matte_sample_is_not_determined() -> None:
+    found = fit(MODELS["lambert+torrance_sparrow"], scan("lambert", 1, albedo=0.8))
+    assert found.u["sigma_deg"] is None
+    assert found.intervals["sigma_deg"] == (0.5, 60.0)
+    assert "sigma_deg" in found.undetermined
+    assert found.u["albedo"] == pytest.approx(0.004, rel=0.1)
+    assert np.isnan(found.correlation[2, 2])
+
+
+def test_a_value_on_its_bound_has_no_u() -> None:
+    model = MODELS["oren_nayar+torrance_sparrow"]
+    scans = (scan("oren_nayar", n, albedo=0.8, sigma_deg=40, acceptance=RIG) for n in range(8))
+    fits = (fit(model, m, RIG) for m in scans)
+    found = next(result for result in fits if result.values["ks"] == 0)  # half of all seeds
+    assert found.u["ks"] is None
+    assert found.intervals["ks"][0] == 0
+    assert 0 < found.intervals["ks"][1] < 1e-3
+    assert found.undetermined == ()
+    bound = fit(MODELS["lambert"], Measurements.bare(30, [0, 20, 40], 0, 0.33, 1e-4))
+    assert bound.values["albedo"] == 1
+    assert bound.u["albedo"] is None
+    assert bound.undetermined == ()
+
+
+def test_one_geometry_does_not_tell_albedo_from_roughness() -> None:
+    m = Measurements.bare([0.0] * 6, [0.0] * 6, 0.0, 0.2 + 1e-4 * np.arange(6), 2e-4)
+    found = fit(MODELS["oren_nayar"], m)
+    assert found.u["sigma_deg"] is None
+    assert "sigma_deg" in found.undetermined
+
 
 INCIDENCES = (15.0, 30.0, 45.0, 60.0)
+
+
 VIEWS = np.arange(-75.0, 76.0, 5.0)
+
+
 THETA_I = np.repeat(INCIDENCES, VIEWS.size)
+
+
 THETA_R = np.tile(VIEWS, len(INCIDENCES))
+
+
 GEOMETRY = Geometry.from_degrees(theta_i=THETA_I, theta_r=THETA_R)
+
 
 TRUTHS: dict[str, dict[str, float]] = {
     "lambert": {"albedo": 0.6},
@@ -37,6 +82,8 @@ TRUTHS: dict[str, dict[str, float]] = {
     "wolff": {"single_scattering_albedo": 0.9, "n": 1.5},
     "oren_nayar+torrance_sparrow": {"albedo": 0.75, "sigma_deg": 25.0, "ks": 0.1},
 }
+
+
 # The simpler surface, and what makes it the other one.
 STEPS = [
     ("lambert", {"albedo": 0.6}, "oren_nayar", {"albedo": 0.6, "sigma_deg": 25.0}),
@@ -48,6 +95,8 @@ STEPS = [
         {"albedo": 0.75, "sigma_deg": 25.0, "ks": 0.1},
     ),
 ]
+
+
 BOUNDED, FEW = 0.04, 0.01  # the share of the scans, and of the choices, that `make test` runs
 
 
@@ -72,7 +121,7 @@ def interval_95(result: FitResult, name: str) -> tuple[float, float]:
 def cramer_rao(name: str, truth: Mapping[str, float], u_relative: float) -> FloatArray:
     """The least standard deviations that any unbiased estimate of the parameters can have."""
     m = next(scans(name, truth, u_relative, 1))
-    problem = Problem(MODELS[name], GEOMETRY, m.brdf, independent(m))
+    problem = Problem(MODELS[name], GEOMETRY, m.brdf, independent_covariance(m))
     J = problem.jacobian(np.array([truth[p.name] for p in MODELS[name].parameters]))
     return np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.data.acceptance import Acceptance, averaged_brdf
+from analysis.data.covariance import Covariance
 from analysis.data.measurements import Measurements, SharedError, setting_numbers
+from analysis.fit.problem import Problem
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
 
@@ -67,8 +69,21 @@ def scan(
     )  # fmt: skip
 
 
-def test_the_scan_is_what_it_says() -> None:
-    m = scan("lambert", 1, u_relative=1e-12, u_tile=0.0, u_deg=0.0, albedo=0.5)
-    assert m.size == 96  # 99 less the one next to the lamp at each incidence
-    np.testing.assert_allclose(m.brdf, 0.5 / np.pi, rtol=1e-10)
-    assert np.unique(m.lamp_setting).size == 3
+def noise_free(name: str, truth: dict[str, float]) -> Measurements:
+    theta_i, theta_r, dphi = scan_angles()
+    geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
+    value = MODELS[name].brdf(geometry, **truth)
+    return Measurements.bare(theta_i, theta_r, dphi, value, 1e-3 * value + 1e-9)
+
+
+def problem_of(name: str, m: Measurements) -> Problem:
+    assert m.u_random is not None
+    C = Covariance(np.square(m.u_random), np.zeros((m.size, 0)))
+    return Problem(MODELS[name], m.geometry, m.brdf, C)
+
+
+def three_sweeps(order: FloatArray | None = None) -> Measurements:
+    """96 points; `order`: the order in which they were measured."""
+    theta_i, theta_r, dphi = scan_angles()
+    chosen = np.arange(theta_i.size) if order is None else np.argsort(order)
+    return Measurements.bare(theta_i[chosen], theta_r[chosen], dphi[chosen], 0.2, 1e-3)

@@ -20,10 +20,10 @@ from analysis.data.curet import read_curet
 from instrument.config.load import load_protocol, load_rig
 from instrument.errors import InputError
 from instrument.text.terminal_safe import first_unfit
-from tests.analysis.data.test_curet import TABLE, VALUES
+from tests.support.analysis.csv_texts import BARE, PLAIN
+from tests.support.analysis.curet_texts import TABLE, VALUES
 from tests.support.command import gonio
 from tests.support.config.texts import PROTOCOL, RIG, check_model
-from tests.support.csv_texts import BARE, PLAIN
 from tests.support.paths import CONFIGS
 from tests.support.strangers.mutations import Mutator, feed
 

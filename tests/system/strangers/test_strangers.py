@@ -18,8 +18,8 @@ from instrument.config.load import Loaded, load_protocol
 from instrument.config.yaml_positions import MAX_BYTES
 from instrument.errors import DeviceError, InputError
 from instrument.text.terminal_safe import first_unfit
+from tests.support.analysis.csv_texts import BARE
 from tests.support.config.texts import PROTOCOL, RIG
-from tests.support.csv_texts import BARE
 from tests.support.stages.memory_stages import in_memory
 
 HARMFUL = "\x1b]0;mine\x07\x1b[2J\u202e[bold red]:skull:[link=http://x]here[/link]\r"

@@ -1,0 +1,28 @@
+"""Content of fit.json: the agreed keys, and plain values."""
+
+from __future__ import annotations
+
+import json
+
+from analysis.choice.choice import choose
+from analysis.choice.fit_json import to_json
+from analysis.choice.ladder import LADDER
+from tests.support.analysis.seeded_scan import (
+    scan,
+)
+
+
+def test_json_as_agreed() -> None:
+    found = choose(scan("lambert", 1, albedo=0.8))
+    written = to_json(found)
+    assert json.loads(json.dumps(written, allow_nan=False)) == written
+    assert list(written) == ["chosen", "verdict", "reason", "symmetry", "candidates"]
+    assert written["symmetry"]["says"] == "smooth"
+    assert {c["model"] for c in written["candidates"]} <= set(LADDER)
+    for candidate in written["candidates"]:
+        assert list(candidate) == [
+            "model", "parameters", "rms_relative", "reduced_chi2", "bic", "aicc", "converged",
+            "message",
+        ]  # fmt: skip
+        for entry in candidate["parameters"].values():
+            assert set(entry) == ({"value", "u"} if entry["u"] else {"value", "u", "interval"})
