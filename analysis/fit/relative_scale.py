@@ -25,9 +25,10 @@ _MIN_SCALE = 1e-6
 
 
 def normalise_lamp_levels(m: Measurements, brdf: Brdf) -> Measurements:
-    """Divide each lamp setting by its level relative to a model near the data (BRDF in 1/sr).
+    """Divide the points of each lamp setting by its level relative to a model near the data.
 
-    The remaining error of a level is small and counts as a shared error like any other.
+    `brdf` gives BRDF in 1/sr, of the geometry's shape. The remaining error of a level is small and
+    counts as a shared error like any other.
     """
     if not m.free_levels:
         return m

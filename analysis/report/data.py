@@ -117,7 +117,7 @@ class ReportData:
 
     @property
     def flagged(self) -> BoolArray:
-        """Mask (N,) of the points with a flag."""
+        """Boolean mask (N,) of the points with a flag."""
         return np.array([bool(flag) for flag in self.flags], dtype=bool)
 
     @property

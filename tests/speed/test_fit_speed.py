@@ -1,8 +1,8 @@
-"""Speed of the fit against lmfit, on the same model and data in one run; values first.
+"""Speed of the fit compared with lmfit, on the same model and data; values are checked first.
 
-Measured for 200 points on one core of 2 GHz, with starting points, uncertainties and criteria: the
+Measured for 200 points on one core of 2 GHz, with starting values, uncertainties and criteria: the
 functional form 4 ms, the ladder without the exact model 90 ms (250 ms on a busy machine), an exact
-candidate 35 ms; lmfit, given the true values to start from and asked for the functional form alone,
+candidate 35 ms; lmfit, started at the true values and for the functional form alone,
 3 ms. The limits are ratios to lmfit.
 """
 
@@ -42,7 +42,7 @@ def scan() -> Measurements:
 
 
 def by_lmfit(m: Measurements) -> lmfit.minimizer.MinimizerResult:
-    """The functional form by lmfit's own default method, within the same bounds."""
+    """Fit of the functional form by lmfit's default method, within the same bounds."""
     model, u = MODELS["oren_nayar"], m.u_random
     parameters = lmfit.Parameters()
     for p in model.parameters:
@@ -54,12 +54,12 @@ def by_lmfit(m: Measurements) -> lmfit.minimizer.MinimizerResult:
     return lmfit.minimize(residual, parameters)
 
 
-def test_the_functional_form_is_fitted_as_by_lmfit_and_about_as_fast(scan: Measurements) -> None:
+def test_the_functional_form_fits_as_with_lmfit_and_about_as_fast(scan: Measurements) -> None:
     ours, theirs = fit(MODELS["oren_nayar"], scan), by_lmfit(scan)
     assert ours.chi2 == pytest.approx(theirs.chisqr, rel=1e-6)
     for name, parameter in theirs.params.items():
         assert abs(ours.values[name] - parameter.value) < 1e-2 * parameter.stderr
-        # lmfit scales its errors with chi2; the stated u does not need that.
+        # lmfit scales its errors with chi2, which is not done with a stated u.
         stderr = parameter.stderr / np.sqrt(theirs.redchi)
         assert ours.u[name] == pytest.approx(stderr, rel=0.02)
     ratio = cpu_seconds(lambda: fit(MODELS["oren_nayar"], scan), 15) / cpu_seconds(
@@ -68,7 +68,7 @@ def test_the_functional_form_is_fitted_as_by_lmfit_and_about_as_fast(scan: Measu
     assert ratio < 3
 
 
-def test_the_ladder_and_an_exact_candidate_cost_a_few_of_lmfit_s_fits(scan: Measurements) -> None:
+def test_the_ladder_and_an_exact_candidate_cost_a_few_lmfit_fits(scan: Measurements) -> None:
     cheap = [name for name in LADDER if "exact" not in name]
     choice = choose(scan, models=cheap)
     assert choice.chosen == "oren_nayar"
@@ -86,7 +86,7 @@ def test_the_ladder_and_an_exact_candidate_cost_a_few_of_lmfit_s_fits(scan: Meas
     assert exact[-1].converged
 
 
-def test_speed_of_the_functional_model() -> None:
+def test_the_functional_model_is_fast() -> None:
     rng = np.random.default_rng(0)
     n = 50_000
     geometry = Geometry.from_degrees(
@@ -95,5 +95,5 @@ def test_speed_of_the_functional_model() -> None:
     start = time.perf_counter()
     found = MODELS["oren_nayar"].brdf(geometry, albedo=0.8, sigma_deg=30)
     took = time.perf_counter() - start
-    assert took / n < 2e-6  # 0.15e-6 on a quiet machine; this only notices a blunder
+    assert took / n < 2e-6  # 0.15e-6 on an idle machine; only a gross slowdown fails
     assert np.all(found > 0)

@@ -16,13 +16,7 @@ from analysis.data.measurements import Measurements
 from analysis.models import MODELS
 from instrument.errors import NotDetermined
 from instrument.geometry import Geometry
-from tests.support.analysis.seeded_scan import (
-    DIFFUSE,
-    GLOSSY,
-    RIG,
-    scan,
-    scan_angles,
-)
+from tests.support.analysis.seeded_scan import DIFFUSE, GLOSSY, RIG, scan, scan_angles
 from tests.support.paths import ROOT
 
 GLOSS = "oren_nayar+torrance_sparrow"
@@ -84,7 +78,7 @@ def test_a_small_unknown_error_makes_no_lobe() -> None:
         assert found.chosen == "oren_nayar", found.reason
 
 
-def test_none_adequate_says_where() -> None:
+def test_none_adequate_reports_the_worst_stretch() -> None:
     m = scan("lambert", 1, albedo=0.5)
     peak = 1 + 0.3 * np.exp(-(((m.theta_r_deg - 20) / 8) ** 2))
     found = choose(replace(m, brdf=m.brdf * peak), models=FEW)
@@ -128,7 +122,7 @@ def test_few_points() -> None:
     two = Measurements.bare(30, [0, 20], 0, 0.2, 1e-3)
     found = choose(two)
     assert found.chosen == "lambert"
-    assert "left out, too few points" in found.reason
+    assert "left out for lack of points" in found.reason
     assert max(len(c.values) for c in found.candidates) == 2
     with pytest.raises(NotDetermined, match="too few to fit any"):
         choose(two, models=[GLOSS])
@@ -142,7 +136,7 @@ def test_unknown_models_are_named() -> None:
 CURET = ROOT.parent / "shared" / "data" / "curet"
 
 
-def test_a_model_chosen_for_real_matter_says_that_its_noise_is_an_estimate() -> None:
+def test_the_reason_for_a_real_material_mentions_the_estimated_noise() -> None:
     chosen = choose(read_curet(CURET, 49, 68.8).measurements)
     assert chosen.verdict == "adequate"
     assert "no u stated" in chosen.reason
@@ -151,7 +145,7 @@ def test_a_model_chosen_for_real_matter_says_that_its_noise_is_an_estimate() -> 
 
 @pytest.mark.slow
 def test_the_automatic_choice_over_the_materials(slow: bool) -> None:
-    """All 61 with `pytest --slow`; else one of small misfit, 28."""
+    """All 61 materials with `pytest --slow`; else one with a small misfit, 28."""
     rms = []
     for sample in range(1, 62) if slow else (28,):
         choice = choose(read_curet(CURET, sample, 68.8).measurements)

@@ -1,4 +1,4 @@
-"""Points left out: whole incidences or blocks of view, and what models foretell of them."""
+"""Cross-validation: blocks of points left out, and their prediction by the models."""
 
 from __future__ import annotations
 
@@ -31,7 +31,9 @@ def sweeps_of(*incidences: float) -> Measurements:
 
 @settings(derandomize=True, max_examples=100)
 @given(points=st.lists(ANGLES, min_size=1, max_size=60))
-def test_each_point_is_left_out_once_and_never_all(points: list[tuple[int, int, int]]) -> None:
+def test_each_point_is_left_out_exactly_once_and_never_all(
+    points: list[tuple[int, int, int]],
+) -> None:
     theta_i, theta_r, dphi = np.array(points, dtype=np.float64).T
     left_out = folds(Measurements.bare(10 * theta_i, 10 * theta_r, dphi, 0.2))
     assert len(left_out) != 1
@@ -42,7 +44,7 @@ def test_each_point_is_left_out_once_and_never_all(points: list[tuple[int, int, 
 
 
 @pytest.mark.parametrize("count", [3, 4, 5, 7, 12])
-def test_an_incidence_is_left_out_whole(count: int) -> None:
+def test_an_incidence_is_left_out_as_a_whole(count: int) -> None:
     m = sweeps_of(*np.linspace(0, 75, count))
     left_out = folds(m)
     assert len(left_out) == min(count, MAX_FOLDS)
@@ -54,7 +56,9 @@ def test_an_incidence_is_left_out_whole(count: int) -> None:
 
 
 @pytest.mark.parametrize("incidences", [(45.0,), (30.0, 60.0)])
-def test_of_one_or_two_incidences_blocks_of_view_are_left_out(incidences: tuple[float]) -> None:
+def test_with_one_or_two_incidences_blocks_of_view_angles_are_left_out(
+    incidences: tuple[float],
+) -> None:
     m = sweeps_of(*incidences)
     left_out = folds(m)
     assert len(left_out) == MAX_FOLDS
@@ -74,7 +78,7 @@ def test_both_forms_of_a_geometry_make_the_same_blocks() -> None:
         assert one.tolist() == other.tolist()
 
 
-def test_scattered_directions_are_left_out_by_their_neighbours_in_incidence() -> None:
+def test_scattered_directions_are_left_out_in_blocks_of_incidence() -> None:
     rng = np.random.default_rng(0)
     m = Measurements.bare(
         rng.uniform(0, 80, 100), rng.uniform(0, 80, 100), rng.uniform(0, 360, 100), 0.2
@@ -86,10 +90,10 @@ def test_scattered_directions_are_left_out_by_their_neighbours_in_incidence() ->
 
 
 @pytest.mark.parametrize("aside", [(0.0, 10.0), (60.0, 75.0), (0.0, 75.0)])
-def test_of_one_sweep_and_a_few_points_beside_it_the_sweep_is_not_left_out(
+def test_a_sweep_with_a_few_other_points_is_not_left_out_as_a_whole(
     aside: tuple[float, float],
 ) -> None:
-    """Two points foretell nothing of ninety-seven, whatever the model."""
+    """Two points do not predict ninety-seven, whatever the model."""
     theta_i = np.r_[aside, np.full(97, 45.0)]
     theta_r = np.r_[5.0, 5.0, np.linspace(-80, 80, 97)]
     geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r)
@@ -109,21 +113,21 @@ def test_one_view_angle_leaves_nothing_out() -> None:
     assert folds(Measurements.bare([30.0, 60.0], 10.0, 0.0, 0.2)) == []
 
 
-def foretold(name: str, m: Measurements) -> float:
-    """chi2 of the points that were left out of the model's fits."""
+def prediction_error(name: str, m: Measurements) -> float:
+    """Prediction error of a model at the points left out of its fits."""
     fitted = first_fit(MODELS[name], m)
     return held_out_error(m, fitted.problem, fitted.solution.x, folds(m))
 
 
 def score(true: str, other: str, truth: dict[str, float], *, one: bool = False) -> FloatArray:
-    """By how much `other` foretells scans of the true model worse, for 20 seeds."""
+    """Prediction error of `other` minus that of the true model, for 20 seeds."""
     found = []
     for seed in range(20):
         m = scan(true, seed, u_tile=0.0, u_deg=0.0, **truth)
         if one:
             k = m.theta_i_deg == 45
             m = Measurements.bare(45.0, m.theta_r_deg[k], 0.0, m.brdf[k], 5e-4 * m.brdf[k])
-        found.append(foretold(other, m) - foretold(true, m))
+        found.append(prediction_error(other, m) - prediction_error(true, m))
     return np.array(found)
 
 
@@ -140,10 +144,10 @@ def score(true: str, other: str, truth: dict[str, float], *, one: bool = False) 
         ),
     ],
 )
-def test_a_term_too_many_foretells_worse(
+def test_an_unnecessary_term_predicts_worse(
     true: str, other: str, truth: dict[str, float], one: bool
 ) -> None:
-    """On average: where the term comes out as 0, which is half of all scans, they are alike."""
+    """On average: in half of all scans the term is fitted as 0, and both models agree."""
     worse = score(true, other, truth, one=one)
     assert np.mean(worse) > 0
     assert np.mean(worse > -0.5) > 0.7
@@ -157,27 +161,25 @@ def test_a_term_too_many_foretells_worse(
         ("lambert+torrance_sparrow", "lambert", {"albedo": 0.7, "sigma_deg": 10.0, "ks": 0.05}),
     ],
 )
-def test_a_term_that_is_there_foretells_better(
-    true: str, other: str, truth: dict[str, float]
-) -> None:
+def test_a_necessary_term_predicts_better(true: str, other: str, truth: dict[str, float]) -> None:
     assert np.all(score(true, other, truth) > 100)
 
 
-def test_a_true_model_foretells_about_as_well_as_it_fits() -> None:
-    """A mean of 64 points foretells each of the other 32 with u^2 = 1 + 1 / 64; the mean size of a
-    normal error is sqrt(2 / pi) of that.
+def test_a_true_model_predicts_about_as_well_as_it_fits() -> None:
+    """A mean of 64 points predicts each of the other 32 with u^2 = 1 + 1 / 64; the mean absolute
+    value of a normal error is sqrt(2 / pi) of that.
     """
     found = []
     for seed in range(60):
         m = scan("lambert", seed, u_tile=0.0, u_deg=0.0, albedo=0.8)
-        found.append(foretold("lambert", m))
+        found.append(prediction_error("lambert", m))
     expected = 96 * np.sqrt(2 / np.pi * (1 + 1 / 64))
-    # One size has the standard deviation sqrt(1 - 2 / pi).
+    # The absolute value of a normal error has the standard deviation sqrt(1 - 2 / pi).
     assert np.mean(found) == pytest.approx(expected, abs=3 * np.sqrt((1 - 2 / np.pi) * 96 / 60))
 
 
 def test_one_outlier_counts_once() -> None:
-    """100 u at one point: it is missed by 100, and draws the others' mean by 100 / 64 at most."""
+    """An error of 100 u at one point changes the prediction of the others by at most 100 / 64."""
     theta_i, theta_r, dphi = scan_angles()
     value = np.full(theta_i.size, 0.2)
     value[40] += 0.1

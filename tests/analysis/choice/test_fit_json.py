@@ -7,12 +7,10 @@ import json
 from analysis.choice.choice import choose
 from analysis.choice.fit_json import to_json
 from analysis.choice.ladder import LADDER
-from tests.support.analysis.seeded_scan import (
-    scan,
-)
+from tests.support.analysis.seeded_scan import scan
 
 
-def test_json_as_agreed() -> None:
+def test_the_keys_are_as_documented() -> None:
     found = choose(scan("lambert", 1, albedo=0.8))
     written = to_json(found)
     assert json.loads(json.dumps(written, allow_nan=False)) == written

@@ -9,20 +9,18 @@ from analysis.choice.runs_test import Stretch, runs_probability, worst_stretches
 from analysis.data.measurements import Measurements
 from analysis.data.sweeps import sweeps
 from instrument.geometry import FloatArray, Geometry
-from tests.support.analysis.seeded_scan import (
-    three_sweeps,
-)
+from tests.support.analysis.seeded_scan import three_sweeps
 
 
-def test_a_point_alone_is_no_sweep() -> None:
+def test_a_single_point_is_not_a_sweep() -> None:
     m = Measurements.bare([10.0, 20.0, 20.0, 20.0], [5.0, 5.0, 15.0, 5.0], [0, 0, 0, 90.0], 0.2)
     assert [s.points.tolist() for s in sweeps(m)] == [[1, 2]]
     assert runs_probability(m, np.array([1.0, 1, 1, 1])) == 1
 
 
 @pytest.mark.parametrize("incidences", [1, 3])
-def test_noise_is_seldom_called_structure(incidences: int) -> None:
-    """A probability below p in about that part of all scans: 0.05 of 300 is 15 +- 3.8."""
+def test_noise_is_rarely_taken_for_structure(incidences: int) -> None:
+    """A probability below p occurs in about that fraction of scans: 0.05 of 300 is 15 +- 3.8."""
     m = three_sweeps()
     m = Measurements.bare(m.theta_i_deg[: 32 * incidences], m.theta_r_deg[: 32 * incidences], 0, 1)
     rng = np.random.default_rng(7)
@@ -52,14 +50,14 @@ def test_runs_follow_the_angle_and_not_the_order_of_measurement() -> None:
     assert runs_probability(shuffled, waves[np.argsort(order)]) == runs_probability(m, waves)
 
 
-def test_points_set_aside_have_no_sign() -> None:
+def test_points_set_aside_do_not_count_in_runs() -> None:
     m = three_sweeps()
     waves = np.sin(np.radians(4 * m.theta_r_deg))
     waves[np.abs(waves) < 0.3] = 0
     assert runs_probability(m, waves) < 1e-9
-    kept = waves != 0
-    less = Measurements.bare(m.theta_i_deg[kept], m.theta_r_deg[kept], 0, 1.0)
-    assert runs_probability(m, waves) == pytest.approx(runs_probability(less, waves[kept]))
+    counted = waves != 0
+    less = Measurements.bare(m.theta_i_deg[counted], m.theta_r_deg[counted], 0, 1.0)
+    assert runs_probability(m, waves) == pytest.approx(runs_probability(less, waves[counted]))
 
 
 def bump(m: Measurements, height: float) -> FloatArray:
@@ -83,7 +81,7 @@ def test_the_failing_stretch_is_named(height: float) -> None:
     assert ("(+" if height > 0 else "(-") in str(worst)
 
 
-def test_the_worst_comes_first_and_what_noise_leaves_is_not_named() -> None:
+def test_the_worst_stretch_comes_first_and_noise_is_not_reported() -> None:
     m = three_sweeps()
     r = bump(m, 4.0)
     r[m.theta_i_deg == 60] -= 2.0
@@ -93,8 +91,8 @@ def test_the_worst_comes_first_and_what_noise_leaves_is_not_named() -> None:
     assert len(calm) == 1  # the worst is named in any case
 
 
-def test_a_point_set_aside_does_not_cut_a_stretch() -> None:
-    """A robust fit's outlier stands with residual 0 among neighbours of either sign."""
+def test_a_point_set_aside_does_not_split_a_stretch() -> None:
+    """An outlier of a robust fit has residual 0 among neighbours of either sign."""
     m = three_sweeps()
     for height in (4.0, -4.0):
         r = bump(m, height)
@@ -115,10 +113,10 @@ def test_a_point_set_aside_does_not_cut_a_stretch() -> None:
         (-35.0, 200.0, (20, 35)),
     ],
 )
-def test_scattered_points_are_named_where_they_are(
+def test_scattered_points_are_reported_with_their_angles(
     theta_r: float, dphi: float, named: tuple[float, float]
 ) -> None:
-    """One form for all: dphi below 180 degrees, theta_r signed in that plane."""
+    """In one form: dphi below 180 degrees, theta_r signed in that plane."""
     m = Measurements.bare([10.0, 20.0, 30.0], [15.0, theta_r, 25.0], [70.0, dphi, 110.0], 0.2)
     assert sweeps(m) == []
     (worst,) = worst_stretches(m, np.array([0.1, -9.0, 0.1]))

@@ -1,4 +1,4 @@
-"""Rough or smooth: a surface is called rough when it is, and not for noise or angles that are off.
+"""Symmetry test: rough surfaces are found, and noise or errors of angles are not roughness.
 
 Wolff, Nayar and Oren 1998, section 3.1: at a fixed incidence a smooth surface's diffuse radiance is
 symmetric about the normal; a rough one is brighter on the lamp's side; gloss on the mirror side.
@@ -43,7 +43,7 @@ def dense(
     u_relative: float = 5e-4,
     turned: bool = False,
 ) -> Measurements:
-    """One incidence of 45 degrees, all view angles off alike; `turned`: theta_r without signs."""
+    """Sweep at 45 degrees with one error of all view angles; `turned`: theta_r without signs."""
     view = np.arange(-80, 80 + step_deg, step_deg)
     view = view[np.abs(view - 45) >= 3]
     there = Geometry.from_degrees(theta_i=45.0, theta_r=view + off_deg)
@@ -56,7 +56,7 @@ def dense(
 
 @pytest.mark.parametrize(("name", "truth"), SMOOTH)
 def test_a_smooth_surface_is_called_smooth(name: str, truth: dict[str, float]) -> None:
-    """Of 1000 scans one is not: the level is 0.001; all uncertainties as stated are at work."""
+    """One of 1000 scans is not: the level is 0.001. All stated uncertainties are simulated."""
     count = 200 if name == "lambert" else 60
     found = [judged(name, seed, **truth) for seed in range(count)]
     assert Counter(f.outcome for f in found)["smooth"] >= 0.99 * count
@@ -108,14 +108,14 @@ def test_the_asymmetry_is_the_difference_over_the_sum() -> None:
     ],
     ids=["normal incidence", "one side", "no twins", "across", "two incidences", "one point"],
 )
-def test_without_twins_of_view_angles_it_is_not_tested(m: Measurements) -> None:
-    """In the plane across the lamp's, and at normal incidence, any isotropic surface is alike."""
+def test_without_mirrored_view_angles_there_is_no_test(m: Measurements) -> None:
+    """Across the lamp's plane, and at normal incidence, any isotropic surface is symmetric."""
     found = symmetry(m, lambda g: np.full(g.shape, 0.2), 0.0)
     assert found == Symmetry("not tested", 0, 0.0, 1.0)
     assert "not tested" in str(found)
 
 
-def test_points_without_a_twin_are_left_out() -> None:
+def test_points_without_a_mirrored_point_are_left_out() -> None:
     m = dense("lambert", {"albedo": 0.8}, 1)
     assert symmetry(m, brdf_of("lambert", {"albedo": 0.8}), 0.0).pairs == 15  # 16 less 45 degrees
 
@@ -123,10 +123,10 @@ def test_points_without_a_twin_are_left_out() -> None:
 @pytest.mark.parametrize("turned", [False, True], ids=["signed", "unsigned"])
 @pytest.mark.parametrize("step_deg", [1.0, 5.0])
 @pytest.mark.parametrize("u_deg", [0.02, 0.3, 1.0])
-def test_view_angles_that_are_off_alike_by_their_u_are_no_roughness(
+def test_an_error_of_the_zero_of_theta_r_is_not_roughness(
     u_deg: float, step_deg: float, turned: bool
 ) -> None:
-    """A stage whose zero is off by its u; the signed and the unsigned form of the same scan."""
+    """Zero of the stage wrong by its u, in the signed and the unsigned form of the same scan."""
     smooth = brdf_of("wolff", PLASTIC)
     for sign in (-1, 1):
         for seed in range(3):
@@ -146,7 +146,7 @@ def test_large_errors_of_angles_do_not_hide_roughness() -> None:
 
 
 @pytest.mark.parametrize(("name", "truth"), SMOOTH)
-def test_without_stated_u_the_fit_s_noise_serves(name: str, truth: dict[str, float]) -> None:
+def test_without_stated_u_the_noise_of_the_fit_is_used(name: str, truth: dict[str, float]) -> None:
     found = []
     for seed in range(100):
         m = dense(name, truth, seed, u_relative=2e-3)

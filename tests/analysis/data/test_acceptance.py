@@ -1,4 +1,4 @@
-"""What lamp, lens and patch average over, against exact cases and an independent average."""
+"""Averaging over lamp, lens and patch, compared with exact cases and with random rays."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_the_disc_rule_is_exact_for_polynomials(
     assert found == pytest.approx(disc_moment(p, q), abs=1e-14)
 
 
-def test_no_rings_are_the_centre() -> None:
+def test_zero_rings_are_the_centre() -> None:
     nodes, weights = disc_rule(0)
     assert nodes.tolist() == [[0, 0]]
     assert weights.tolist() == [1]
@@ -61,7 +61,7 @@ def test_no_rings_are_the_centre() -> None:
     theta_i=st.floats(0, 85), theta_r=st.floats(-85, 85), dphi=st.floats(0, 360),
     rings=st.integers(0, 3),
 )  # fmt: skip
-def test_a_lambertian_comes_back_as_it_is(
+def test_a_lambertian_brdf_is_not_changed(
     theta_i: float, theta_r: float, dphi: float, rings: int
 ) -> None:
     found = averaged_brdf(lambert, theta_i, theta_r, dphi, RIG, rings)
@@ -139,7 +139,7 @@ def test_light_falls_with_the_square_of_the_distance_and_the_cosine() -> None:
     assert found == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_lens_that_dips_below_the_horizon_counts_where_it_sees() -> None:
+def test_only_the_part_of_a_lens_above_the_horizon_counts() -> None:
     found = averaged_brdf(lambert, 40.0, [-90.0, 89.9, 90.0], 0.0, RIG, 3)
     np.testing.assert_allclose(found, 0.8 / np.pi, rtol=1e-12)
     above = np.array([0.0, 0.0, 500.0])  # from here the whole lens is below the horizon
@@ -156,7 +156,7 @@ def test_no_light_is_an_error() -> None:
         averaged_brdf(lambert, 95.0, 0.0, 0.0, RIG, 1)
 
 
-def test_needed_rings_reaches_its_tolerance() -> None:
+def test_required_rings_reach_the_tolerance() -> None:
     assert required_rings(lambert, THETA_I, THETA_R, DPHI, RIG).max() == 0
     rings = int(required_rings(rough, THETA_I, THETA_R, DPHI, RIG).max())
     assert 1 <= rings <= 4

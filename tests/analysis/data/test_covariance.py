@@ -12,9 +12,7 @@ from analysis.data.covariance import Covariance, full_covariance, independent_co
 from analysis.data.measurements import Measurements, SharedError
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
-from tests.support.analysis.seeded_scan import (
-    scan,
-)
+from tests.support.analysis.seeded_scan import scan
 
 
 def test_whitening_gives_the_chi2_of_the_full_matrix() -> None:
@@ -29,8 +27,8 @@ def test_whitening_gives_the_chi2_of_the_full_matrix() -> None:
     np.testing.assert_allclose(C.u_total**2, np.diag(C.matrix()), rtol=1e-12)
 
 
-def test_the_pulls_are_the_likeliest_shared_errors() -> None:
-    """Against the normal equations of points and shared errors taken together."""
+def test_pulls_are_the_most_likely_shared_errors() -> None:
+    """Compared with the joint normal equations of points and shared errors."""
     rng = np.random.default_rng(5)
     C = Covariance(rng.uniform(0.5, 2, 20), rng.normal(size=(20, 4)))
     r = rng.normal(size=20)
@@ -39,7 +37,7 @@ def test_the_pulls_are_the_likeliest_shared_errors() -> None:
     assert C.pulls(r) == pytest.approx(expected, rel=1e-9)
 
 
-def test_shared_errors_are_where_they_belong() -> None:
+def test_shared_errors_stand_at_the_right_points_of_the_matrix() -> None:
     m = scan("oren_nayar", 1, albedo=0.8, sigma_deg=30)
     reading = SharedError("reading", np.full(m.size, 0.002), m.lamp_setting)
     m = replace(m, shared=(*m.shared, reading))
@@ -52,11 +50,11 @@ def test_shared_errors_are_where_they_belong() -> None:
     step = 1e-4
     up = smooth(Geometry.from_degrees(theta_i=m.theta_i_deg + step, theta_r=m.theta_r_deg))
     down = smooth(Geometry.from_degrees(theta_i=m.theta_i_deg - step, theta_r=m.theta_r_deg))
-    slope = (up - down) / (2 * step)
+    gradient = (up - down) / (2 * step)
     a, b, far = 3, 5, m.size - 1  # two points of one lamp setting, and one of another
     tile = 0.005**2
     assert C[a, far] == pytest.approx(tile * f[a] * f[far], rel=1e-9)
-    shared_ab = (tile + 0.002**2) * f[a] * f[b] + 0.02**2 * slope[a] * slope[b]
+    shared_ab = (tile + 0.002**2) * f[a] * f[b] + 0.02**2 * gradient[a] * gradient[b]
     assert C[a, b] == pytest.approx(shared_ab, rel=1e-4)
 
 
@@ -104,8 +102,8 @@ def test_a_sparse_covariance_is_the_full_one() -> None:
     assert white @ white == pytest.approx(residual @ np.linalg.solve(full.matrix(), residual))
 
 
-def test_a_known_level_of_no_worth_leaves_what_does_not_share_it() -> None:
-    """A shared error of 10^5 u: what is alike in all points is nought, the rest stays as it is."""
+def test_a_very_uncertain_level_leaves_the_pattern_unchanged() -> None:
+    """A shared error of 10^5 u: the common level vanishes, and the rest is unchanged."""
     C = Covariance(np.ones(50), np.full((50, 1), 1e5))
     rest = np.sin(np.arange(50.0))
     rest -= rest.mean()

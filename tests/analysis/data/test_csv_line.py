@@ -6,7 +6,7 @@ import pytest
 
 from tests.support.analysis.csv_texts import BARE, PLAIN, changed, problems
 
-# What to replace in which table, by what, and the whole message, counted by hand.
+# Table, text to replace, replacement, and the whole message, with positions counted by hand.
 MISTAKES = {
     "text in quotes, behind spaces": (
         PLAIN,
@@ -46,7 +46,5 @@ def test_a_mistake(kind: str) -> None:
         assert more.pop(0).startswith("data.csv:2:16: row: 4 fields; allowed: 5")
         assert more.pop(0).startswith("data.csv:3:13: row: 4 fields; allowed: 5")
     assert found.startswith(f"data.csv:{message}")
-    assert (
-        len(found) - len(f"data.csv:{message}") < 30
-    )  # the words left out are those of a sentence above
+    assert len(found) - len(f"data.csv:{message}") < 30  # the rest of the sentence is covered above
     assert not more

@@ -18,7 +18,7 @@ from tests.support.analysis.csv_texts import BARE, NAMES, PLAIN, changed, proble
 def test_a_plain_table() -> None:
     m = read(PLAIN)
     assert m.theta_i_deg.tolist() == [30, 30]
-    assert m.theta_r_deg.tolist() == [-20.5, 10]  # the sign is kept
+    assert m.theta_r_deg.tolist() == [-20.5, 10]  # with its sign
     assert m.dphi_deg.tolist() == [0, 0]
     assert m.brdf.tolist() == [0.25, -0.001]  # noise about zero is data
     assert m.u_random is not None
@@ -32,7 +32,7 @@ def test_u_brdf_is_stated_for_all_rows_or_for_none() -> None:
     assert read(PLAIN.replace("0.002", " ")).u_random is None
 
 
-# Ways to write BARE that mean the same.
+# Equivalent notations of BARE.
 SAME = {
     "byte order mark": "\ufeff" + BARE,
     "CRLF": BARE.replace("\n", "\r\n"),
@@ -47,7 +47,7 @@ SAME = {
 
 
 @pytest.mark.parametrize("kind", SAME)
-def test_the_same_table_written_otherwise(kind: str) -> None:
+def test_equivalent_notations_of_a_table(kind: str) -> None:
     m, expected = read(SAME[kind]), read(BARE)
     for name in ("theta_i_deg", "theta_r_deg", "dphi_deg", "brdf"):
         np.testing.assert_array_equal(getattr(m, name), getattr(expected, name))
@@ -72,7 +72,7 @@ def test_one_direction_by_other_angles_is_another_setting() -> None:
     assert len(set(m.lamp_setting.tolist())) == 5  # (30, 0) serves two of them
 
 
-# What to replace in which table, by what, and the whole message, counted by hand.
+# Table, text to replace, replacement, and the whole message, with positions counted by hand.
 MISTAKES = {
     "text": (
         PLAIN,
@@ -217,9 +217,7 @@ def test_a_mistake(kind: str) -> None:
         assert more.pop(0).startswith("data.csv:2:16: row: 4 fields; allowed: 5")
         assert more.pop(0).startswith("data.csv:3:13: row: 4 fields; allowed: 5")
     assert found.startswith(f"data.csv:{message}")
-    assert (
-        len(found) - len(f"data.csv:{message}") < 30
-    )  # the words left out are those of a sentence above
+    assert len(found) - len(f"data.csv:{message}") < 30  # the rest of the sentence is covered above
     assert not more
 
 
@@ -231,7 +229,7 @@ def test_an_empty_brdf_in_every_row_has_its_own_message() -> None:
     )
 
 
-def test_all_mistakes_are_reported_at_once_by_place() -> None:
+def test_all_mistakes_are_reported_at_once_by_position() -> None:
     found = problems(
         "theta_i_deg,theta_r_deg,dphi_deg,brdf,u_brdf,brdf\n"
         "95,91,x,.2,0,\n"
@@ -273,7 +271,7 @@ FURTHER = TEXT.filter(lambda text: not text.lstrip("\ufeff").startswith("#"))
 
 
 @given(data=st.data(), end=st.sampled_from(["\n", "\r\n"]), mark=st.sampled_from(["", "\ufeff"]))
-def test_a_table_comes_back_as_it_was_written(data: st.DataObject, end: str, mark: str) -> None:
+def test_a_table_is_read_back_as_written(data: st.DataObject, end: str, mark: str) -> None:
     geometries = data.draw(st.lists(GEOMETRY, min_size=1, max_size=6, unique=True))
     rows = [(*geometry, *data.draw(VALUES)) for geometry in geometries]
     further = data.draw(
@@ -298,7 +296,7 @@ def test_a_table_comes_back_as_it_was_written(data: st.DataObject, end: str, mar
 
 
 @given(st.text(st.sampled_from('theta_ir_deg,dphi\n\r\t;#"0123456789.-e x'), max_size=80))
-def test_no_text_breaks_the_reader(rest: str) -> None:
+def test_no_text_crashes_the_reader(rest: str) -> None:
     for text in (rest, BARE + rest):
         found: tuple[str, ...] = ()
         try:
@@ -316,4 +314,6 @@ def test_many_rows_are_read_quickly() -> None:
     m = read(text)
     took = time.perf_counter() - start
     assert m.size == count
-    assert took / count < 100e-6  # some 6e-6 s a row on a quiet machine; this notices a blunder
+    assert (
+        took / count < 100e-6
+    )  # some 6e-6 s a row on an idle machine; only a gross slowdown fails

@@ -54,7 +54,7 @@ def test_a_sample_in_degrees_by_the_convention_of_the_program() -> None:
     assert counts(curet) == (3, 1, 0, 0, 4)
 
 
-def test_what_is_left_out_is_counted_within_the_asked_directions() -> None:
+def test_values_left_out_are_counted_within_the_requested_directions() -> None:
     assert counts(read_curet(write(), 1)) == (3, 0, 1, 0, 4)
     assert counts(read_curet(write(), 1, 80.0)) == (3, 0, 0, 1, 4)
     assert counts(read_curet(write(), 2, 60.0)) == (1, 1, 0, 2, 4)
@@ -75,7 +75,7 @@ def test_comments_blank_lines_and_crlf() -> None:
 THETA = "allowed: a number from 0 to 1.570796 rad"
 
 
-# What to replace in TABLE, by what, and the whole message, counted by hand.
+# Text to replace, replacement, and the whole message, with positions counted by hand.
 TABLE_MISTAKES = {
     "text": ("0.500000  -1.57", "x.500000  -1.57", f"1:4: theta_v: 'x.500000' is text; {THETA}"),
     "not finite": (
@@ -187,7 +187,7 @@ def test_a_limit_outside_0_to_90_degrees(limit: float) -> None:
     assert problems(write(), 1, limit) == (words,)
 
 
-def test_nothing_left_to_measure() -> None:
+def test_no_positive_value_is_an_error() -> None:
     words = "curet/abrdf.dat: sample {} has no positive value with both angles at most {} deg;"
     assert problems(write(), 7)[0].startswith(words.format(7, 90))
     assert problems(write(), 1, 5.5)[0].startswith(words.format(1, 5.5))
@@ -214,7 +214,7 @@ def test_files_that_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @published
 def test_all_published_samples_are_read() -> None:
-    """Counts of NOTES.md beside the tables, which were made independently of this reader."""
+    """Counts of NOTES.md with the tables, made independently of this reader."""
     found = [read_curet(PUBLISHED, sample) for sample in range(1, 62)]
     assert {curet.directions for curet in found} == {205}
     assert {curet.beyond for curet in found} == {0}
@@ -236,7 +236,7 @@ def test_directions_of_the_published_tables() -> None:
 
 @published
 @pytest.mark.parametrize(("limit", "rms"), [(90.0, 0.0497), (68.8, 0.0188)])
-def test_the_published_plaster_fits_as_others_found(limit: float, rms: float) -> None:
+def test_the_published_plaster_fits_as_reported(limit: float, rms: float) -> None:
     """Check fits of NOTES.md; a wrong sense of dphi gives several times these residuals."""
     found = fit(MODELS["oren_nayar"], read_curet(PUBLISHED, 10, limit).measurements)
     assert found.rms_relative == pytest.approx(rms, rel=0.01)

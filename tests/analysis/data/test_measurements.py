@@ -1,4 +1,4 @@
-"""Measurements: mistakes are reported by name."""
+"""Measurements: invalid values are reported by name; seeded scans are as stated."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_wrong_measurements_are_named(change: dict[str, object], words: str) -> 
         replace(m, **change)  # type: ignore[arg-type]  # wrong on purpose
 
 
-def test_the_scan_is_what_it_says() -> None:
+def test_a_seeded_scan_has_the_stated_truth() -> None:
     m = scan("lambert", 1, u_relative=1e-12, u_tile=0.0, u_deg=0.0, albedo=0.5)
     assert m.size == 96  # 99 less the one next to the lamp at each incidence
     np.testing.assert_allclose(m.brdf, 0.5 / np.pi, rtol=1e-10)

@@ -10,9 +10,7 @@ from hypothesis import strategies as st
 from analysis.data.measurements import Measurements
 from analysis.data.sweeps import plane_and_view, signed_view, sweeps
 from instrument.geometry import Geometry
-from tests.support.analysis.seeded_scan import (
-    three_sweeps,
-)
+from tests.support.analysis.seeded_scan import three_sweeps
 
 
 def test_sweeps_are_by_incidence_and_plane_with_rising_view() -> None:
@@ -31,7 +29,7 @@ def test_sweeps_are_by_incidence_and_plane_with_rising_view() -> None:
 @pytest.mark.parametrize("plane", [0.0, 40.0, 179.0])
 @pytest.mark.parametrize("off", [0.0, 1e-4, -1e-4, 1e-12, -1e-12])
 def test_both_forms_of_a_geometry_are_one_sweep(plane: float, off: float) -> None:
-    """Also where an azimuth is off by rounding: 179.9999 degrees is the far half of 0's plane."""
+    """Also with rounding errors of the azimuth: 179.9999 degrees is in the plane of 0."""
     view = np.array([-60.0, -30.0, 0.0, 20.0, 50.0])
     signed = Measurements.bare(45.0, view, plane, 0.2)
     behind = np.where(view < 0, plane + 180 + off, plane)
@@ -47,7 +45,7 @@ def test_both_forms_of_a_geometry_are_one_sweep(plane: float, off: float) -> Non
     theta_r=st.floats(-90.0, 90.0),
     dphi=st.integers(-720_000, 720_000).map(lambda n: n / 1000),
 )
-def test_in_plane_names_the_same_direction(theta_r: float, dphi: float) -> None:
+def test_plane_and_view_are_the_same_direction(theta_r: float, dphi: float) -> None:
     m = Measurements.bare(30.0, [theta_r], dphi, 0.2)
     plane, view = plane_and_view(m)
     assert 0 <= plane[0] < 180

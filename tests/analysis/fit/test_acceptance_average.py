@@ -6,13 +6,10 @@ import pytest
 
 from analysis.fit.fit import fit
 from analysis.models import MODELS
-from tests.support.analysis.seeded_scan import (
-    RIG,
-    scan,
-)
+from tests.support.analysis.seeded_scan import RIG, scan
 
 
-def test_averaging_is_used_where_it_matters() -> None:
+def test_averaging_is_applied_only_where_it_matters() -> None:
     truth = {"albedo": 0.8, "sigma_deg": 20.0, "ks": 0.076}
     model = MODELS["oren_nayar+torrance_sparrow"]
     m = scan(model.name, 4, acceptance=RIG, **truth)

@@ -1,18 +1,37 @@
-"""Criteria of a fit: BIC and AICc."""
+"""Criteria of a fit: BIC, AICc, and the probability of chi2."""
 
 from __future__ import annotations
 
 import math
 
 import pytest
+from scipy.stats import chi2
 
 from analysis.choice.choice import choose
-from tests.support.analysis.seeded_scan import (
-    scan,
-)
+from analysis.data.measurements import Measurements
+from analysis.fit.criteria import probability
+from analysis.fit.fit import fit
+from analysis.models import MODELS
+from tests.support.analysis.seeded_scan import scan
 
 
-def test_bic_of_stated_u_is_chi2_and_penalty() -> None:
+def test_bic_with_stated_u_is_chi2_plus_penalty() -> None:
     m = scan("lambert", 1, albedo=0.8)
     for c in choose(m, models=["lambert", "oren_nayar"]).candidates:
         assert c.bic == pytest.approx((c.chi2 or 0) + len(c.values) * math.log(m.size))
+
+
+def test_without_stated_u_the_criteria_use_the_residual_sum_of_squares() -> None:
+    m = scan("lambert", 1, albedo=0.8)
+    bare = Measurements.bare(m.theta_i_deg, m.theta_r_deg, m.dphi_deg, m.brdf)
+    found = fit(MODELS["oren_nayar_qualitative"], bare)
+    n, rss = bare.size, float(((found.predicted - bare.brdf) ** 2).sum())
+    deviance = n * math.log(rss / n)
+    assert found.bic == pytest.approx(deviance + 2 * math.log(n))
+    # Hurvich and Tsai 1989; the noise is the third parameter.
+    assert found.aicc == pytest.approx(deviance + 2 * 3 * n / (n - 3 - 1))
+
+
+def test_the_probability_of_chi2_is_the_upper_tail() -> None:
+    assert probability(12.0, 7) == pytest.approx(chi2.sf(12.0, 7))
+    assert probability(12.0, 0) == 1.0  # nothing left to test

@@ -37,7 +37,7 @@ RANGE = {
 
 
 def samples(name: str, count: int) -> list[dict[str, float]]:
-    """Random truths; every fourth with the narrowest lobe."""
+    """Random truths, every fourth with the narrowest lobe."""
     found = []
     for seed in range(count):
         rng = np.random.default_rng(seed)
@@ -49,7 +49,7 @@ def samples(name: str, count: int) -> list[dict[str, float]]:
 
 
 def missed(name: str, truth: dict[str, float], m: Measurements) -> str:
-    """Which parameters a fit does not find to 1e-4, of those that a u of 0.1 % determines."""
+    """Parameters that a fit does not find to 1e-4, of those determined at a u of 0.1 %."""
     fitted = first_fit(MODELS[name], m)
     found = dict(zip(truth, fitted.solution.x, strict=True))
     x = np.array(list(truth.values()))
@@ -87,7 +87,7 @@ def missed(name: str, truth: dict[str, float], m: Measurements) -> str:
         ("lambert+beckmann_spizzichino", 5),
     ],
 )
-def test_truths_are_found_without_a_hint(name: str, count: int, stated: bool) -> None:
+def test_truths_are_found_from_the_data_alone(name: str, count: int, stated: bool) -> None:
     failures = []
     for truth in samples(name, count):
         m = noise_free(name, truth)
@@ -118,7 +118,7 @@ def scan(seed: int, stated: bool = True) -> Measurements:
 
 
 def with_wild_points(m: Measurements, seed: int) -> tuple[Measurements, list[int]]:
-    """Five points 20 to 100 u too high: a bench lamp seen in the sample."""
+    """Five points 20 to 100 u too high, as by the reflection of another lamp."""
     rng = np.random.default_rng(1000 + seed)
     wild = sorted(rng.choice(m.size, 5, replace=False).tolist())
     value = m.brdf.copy()
@@ -129,7 +129,7 @@ def with_wild_points(m: Measurements, seed: int) -> tuple[Measurements, list[int
 
 @pytest.mark.parametrize("stated", [True, False])
 @pytest.mark.parametrize("seed", range(5))
-def test_wild_points_are_named_and_the_truth_comes_back(seed: int, stated: bool) -> None:
+def test_outliers_are_reported_and_the_truth_is_found(seed: int, stated: bool) -> None:
     m, wild = with_wild_points(scan(seed, stated), seed)
     found = fit(MODELS[NAME], m, robust=True)
     assert set(wild) <= set(np.flatnonzero(found.outliers).tolist())
@@ -142,8 +142,8 @@ def test_wild_points_are_named_and_the_truth_comes_back(seed: int, stated: bool)
 
 
 @pytest.mark.parametrize("stated", [True, False])
-def test_a_robust_fit_of_good_points_costs_little(stated: bool) -> None:
-    """Huber's estimate with a limit of 1.345 u needs 5 % more points: its u is 2.6 % larger."""
+def test_a_robust_fit_of_good_points_is_nearly_as_precise(stated: bool) -> None:
+    """Huber's estimate with a limit of 1.345 u has 95 % efficiency: its u is 2.6 % larger."""
     apart = []
     for seed in range(10):
         m = scan(seed, stated)

@@ -11,10 +11,7 @@ from analysis.data.curet import read_curet
 from analysis.data.measurements import Measurements, SharedError
 from analysis.fit.fit import fit
 from analysis.models import MODELS
-from tests.support.analysis.seeded_scan import (
-    GLOSSY,
-    scan,
-)
+from tests.support.analysis.seeded_scan import GLOSSY, scan
 from tests.support.paths import ROOT
 
 
@@ -22,7 +19,7 @@ def tile_of(m: Measurements, u_relative: float) -> SharedError:
     return SharedError.common_to_all("white tile", u_relative, m.size)
 
 
-def test_a_tile_reading_that_is_off_is_named_and_leaves_no_pattern() -> None:
+def test_a_wrong_tile_reading_is_named_and_leaves_no_pattern() -> None:
     m = scan("oren_nayar", 1, albedo=0.8, sigma_deg=30)
     reading = SharedError("reading", np.full(m.size, 0.002), m.lamp_setting)
     m = replace(m, shared=(*m.shared, reading))
@@ -50,9 +47,9 @@ def test_pulls_are_standard_normal(sigma: float, albedo: float, ks: float) -> No
     assert np.mean(np.array(chi2, dtype=float)) == pytest.approx(1, abs=0.12)
 
 
-def test_the_tile_s_error_goes_to_the_albedo_alone() -> None:
-    # Of the model that is proportional to its albedo: interreflection (34), which is not, tells
-    # the albedo from the tile's error a little.
+def test_the_error_of_the_tile_affects_the_albedo_alone() -> None:
+    # A model proportional to its albedo: with interreflection (34), which is not, the data would
+    # separate the albedo from the error of the tile to some degree.
     model = MODELS["oren_nayar_qualitative"]
     m = scan(model.name, 5, u_tile=0.0, albedo=0.8, sigma_deg=30)
     assert m.u_random is not None
@@ -66,15 +63,15 @@ def test_the_tile_s_error_goes_to_the_albedo_alone() -> None:
     assert scaled.chi2 == pytest.approx(exact.chi2, rel=1e-3)
 
 
-def test_no_pull_towards_low_points() -> None:
-    # Peelle's puzzle: two values, 1.5 and 1.0, each 10 % and 20 % in common, do not average 0.88.
+def test_shared_relative_errors_do_not_pull_towards_low_points() -> None:
+    # Peelle's puzzle: values 1.5 and 1.0, each with 10 % and a common 20 %, do not average 0.88.
     m = Measurements.bare(30.0, [0.0, 20.0], 0.0, [0.15, 0.10], [0.015, 0.010])
     m = replace(m, shared=(tile_of(m, 0.2),))
     found = fit(MODELS["lambert"], m)
     assert 0.10 < found.values["albedo"] / np.pi < 0.15
 
 
-def test_a_wrong_model_is_not_excused_by_shared_errors() -> None:
+def test_shared_errors_do_not_absorb_the_misfit_of_a_wrong_model() -> None:
     found = fit(MODELS["lambert"], scan("oren_nayar", 2, albedo=0.8, sigma_deg=40))
     assert found.values["albedo"] == pytest.approx(0.56, abs=0.06)  # about the data's mean
     assert (found.reduced_chi2 or 0) > 1000
@@ -111,7 +108,7 @@ FIGURES = [
 
 
 @pytest.mark.parametrize(("sample", "max_theta_deg", "figures"), FIGURES)
-def test_the_check_fits_within_2_per_cent_of_each_figure(
+def test_published_materials_fit_within_2_percent_of_the_reference_residuals(
     sample: int, max_theta_deg: float, figures: tuple[float, ...]
 ) -> None:
     m = read_curet(CURET, sample, max_theta_deg).measurements
@@ -119,7 +116,7 @@ def test_the_check_fits_within_2_per_cent_of_each_figure(
         assert fit(MODELS[name], m).rms_relative == pytest.approx(figure, rel=0.02), name
 
 
-def test_the_plaster_s_parameters() -> None:
+def test_parameters_of_the_published_plaster() -> None:
     found = fit(MODELS["oren_nayar"], read_curet(CURET, 10).measurements)
     assert found.values["albedo"] == pytest.approx(0.8484, abs=2e-4)
     assert found.values["sigma_deg"] == pytest.approx(np.degrees(0.3844), abs=0.02)

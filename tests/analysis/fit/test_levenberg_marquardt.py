@@ -1,4 +1,4 @@
-"""The descent: SciPy's minima, bounds reached exactly, and no claim of a minimum where none is."""
+"""Minimisation: agrees with SciPy, reaches bounds exactly, and reports no false minimum."""
 
 from __future__ import annotations
 
@@ -25,19 +25,21 @@ Curve = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 
 def exponential(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """a exp(-b t) + c + d t and its slopes, with as many of a, b, c, d as are given."""
+    """a exp(-b t) + c + d t and its derivatives, with as many of a, b, c, d as given."""
     a, b, c, d = np.append(x, NEUTRAL[x.size :])
     decay = np.exp(-b * T)
-    slopes = np.stack([decay, -a * T * decay, np.ones_like(T), T], axis=1)
-    return a * decay + c + d * T, slopes[:, : x.size]
+    gradients = np.stack([decay, -a * T * decay, np.ones_like(T), T], axis=1)
+    return a * decay + c + d * T, gradients[:, : x.size]
 
 
 def rational(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(a + c t) / (1 + b t + d t^2) and its slopes, with as many of a, b, c, d as are given."""
+    """(a + c t) / (1 + b t + d t^2) and its derivatives, with as many of a, b, c, d as given."""
     a, b, c, d = np.append(x, NEUTRAL[x.size :])
     above, below = a + c * T, 1 + b * T + d * T * T
-    slopes = np.stack([1 / below, -above * T / below**2, T / below, -above * T * T / below**2], 1)
-    return above / below, slopes[:, : x.size]
+    gradients = np.stack(
+        [1 / below, -above * T / below**2, T / below, -above * T * T / below**2], 1
+    )
+    return above / below, gradients[:, : x.size]
 
 
 CURVES: tuple[Curve, ...] = (exponential, rational)
@@ -64,7 +66,7 @@ class Task:
         return descend(self.residual, self.jacobian, self.start, self.low, self.high, self.huber)
 
     def scipy(self, start: FloatArray) -> float:
-        """SciPy's minimum of chi2 or the robust loss; it starts off the bounds."""
+        """SciPy's minimum of chi2 or of the robust loss, started off the bounds."""
         off = 1e-9 * (self.high - self.low)
         found: OptimizeResult = least_squares(
             self.residual, np.clip(start, self.low + off, self.high - off), self.jacobian,
@@ -81,7 +83,7 @@ def true_values(rng: np.random.Generator) -> FloatArray:
 
 
 def task(seed: int, huber: float | None = None, noise: float = NOISE) -> Task:
-    """A random one of 1 to 4 parameters; with noise, half of them may end on a bound."""
+    """A random task of 1 to 4 parameters; with noise, half of them may end on a bound."""
     rng = np.random.default_rng(seed)
     curve, truth = CURVES[seed % 2], true_values(rng)
     k = truth.size
@@ -95,7 +97,7 @@ def task(seed: int, huber: float | None = None, noise: float = NOISE) -> Task:
 
 
 @pytest.mark.parametrize("huber", [None, HUBER])
-def test_it_finds_the_minima_that_scipy_finds(huber: float | None) -> None:
+def test_minima_agree_with_scipy(huber: float | None) -> None:
     """SciPy's huber loss is the same sum: z up to 1, then 2 sqrt(z) - 1, of z = (r / HUBER)^2."""
     for seed in SEEDS:
         problem = task(seed, huber)
@@ -112,7 +114,7 @@ def test_it_finds_the_minima_that_scipy_finds(huber: float | None) -> None:
     box=st.lists(BOX, min_size=4, max_size=4),
     huber=st.sampled_from([None, HUBER]),
 )
-def test_where_it_says_converged_scipy_finds_no_way_down(
+def test_scipy_finds_nothing_lower_than_a_converged_minimum(
     curve: Curve,
     truth: list[float],
     box: list[tuple[float, float, float]],
@@ -128,7 +130,7 @@ def test_where_it_says_converged_scipy_finds_no_way_down(
         assert found.chi2 <= problem.scipy(found.x) * (1 + 1e-6) + 1e-12
 
 
-def test_it_nearly_always_converges() -> None:
+def test_nearly_all_searches_converge() -> None:
     assert sum(task(seed).solve().converged for seed in range(400)) >= 398
 
 
@@ -140,7 +142,7 @@ def test_noise_free_data_are_recovered() -> None:
 
 
 def linear(seed: int, alike: float = 1.0) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Columns (30, 3) that differ by the part `alike`, data (30,), and about the minimum (3,)."""
+    """Columns (30, 3) that differ by `alike`, data (30,), and the approximate minimum (3,)."""
     rng = np.random.default_rng(seed)
     A = alike * rng.normal(size=(30, 3)) + (1 - alike) * rng.normal(size=(30, 1))
     x = rng.normal(size=3)
@@ -148,7 +150,7 @@ def linear(seed: int, alike: float = 1.0) -> tuple[FloatArray, FloatArray, Float
 
 
 def line(A: FloatArray, b: FloatArray, start: FloatArray, low: FloatArray, high: FloatArray) -> int:
-    """Evaluations that the linear problem takes, after a comparison with SciPy's exact minimum."""
+    """Number of evaluations for a linear problem, compared with SciPy's exact minimum."""
     points: list[FloatArray] = []
 
     def residual(x: FloatArray) -> FloatArray:
@@ -169,8 +171,8 @@ def test_a_linear_problem_takes_a_few_steps() -> None:
 
 
 @pytest.mark.parametrize("alike", [1.0, 0.1, 0.01])
-def test_bounds_and_columns_nearly_alike_do_not_stop_it_early(alike: float) -> None:
-    """Cut at several bounds at once, a step along a valley would leave the valley."""
+def test_bounds_and_nearly_equal_columns_do_not_end_the_search_early(alike: float) -> None:
+    """A step along a valley, clipped at several bounds at once, would leave the valley."""
     for seed in SEEDS:
         A, b, x = linear(seed, alike)
         rng = np.random.default_rng(seed)
@@ -181,7 +183,7 @@ def test_bounds_and_columns_nearly_alike_do_not_stop_it_early(alike: float) -> N
 
 @pytest.mark.parametrize("bound", [0.7 / 1.1, 0.1 + 0.2, 1 / 7])
 def test_a_minimum_on_a_bound_is_reached_exactly(bound: float) -> None:
-    """To the last bit, also where x + (bound - x) is not the bound in floating point."""
+    """To the last bit, even where x + (bound - x) is not the bound in floating point."""
     y = exponential(np.array([1.0, 0.05]))[0]
     for start in np.linspace(bound, 2.0, 21):
         low, high = np.array([0.0, bound]), np.array([2.0, 2.0])
@@ -195,7 +197,7 @@ def test_a_minimum_on_a_bound_is_reached_exactly(bound: float) -> None:
     assert both.x.tolist() == [bound, -bound]
 
 
-def test_a_start_on_the_bounds_is_left_where_the_way_down_leads_inside() -> None:
+def test_a_start_on_the_bounds_is_left_where_chi2_falls_inwards() -> None:
     for seed in SEEDS:
         problem = task(seed, noise=0.0)
         inside = problem.solve()
@@ -207,7 +209,7 @@ def test_a_start_on_the_bounds_is_left_where_the_way_down_leads_inside() -> None
 
 
 @pytest.mark.parametrize("high", [5.0, 0.7])
-def test_two_columns_alike_share_what_they_explain(high: float) -> None:
+def test_two_equal_columns_share_what_they_explain(high: float) -> None:
     A = np.stack([T, T, np.ones_like(T)], axis=1)
     b = 1 + 2 * T + 0.1 * np.sin(9 * T)
     low, top = np.full(3, -5.0), np.full(3, high)
@@ -219,7 +221,7 @@ def test_two_columns_alike_share_what_they_explain(high: float) -> None:
 
 
 @pytest.mark.parametrize("scale", [0.0, 1.0])
-def test_a_column_of_zeros_leaves_its_parameter_alone(scale: float) -> None:
+def test_a_column_of_zeros_leaves_its_parameter_unchanged(scale: float) -> None:
     A = np.stack([scale * T, 0 * T], axis=1)
     b = 1 + 2 * T
     low, high = np.full(2, -5.0), np.full(2, 5.0)
@@ -237,7 +239,7 @@ def test_a_column_of_zeros_leaves_its_parameter_alone(scale: float) -> None:
         ((-2, -2), (2, 0.3), (0.551423, 0.3)),  # 200 x^3 + (1 - 60) x = 1 with y = 0.3
     ],
 )
-def test_rosenbrock_s_valley(
+def test_rosenbrock_valley(
     low: tuple[float, float], high: tuple[float, float], minimum: tuple[float, float]
 ) -> None:
     """Rosenbrock, The Computer Journal 3 (1960): 100 (y - x^2)^2 + (1 - x)^2 from (-1.2, 1)."""
@@ -254,7 +256,7 @@ def test_rosenbrock_s_valley(
     assert found.x == pytest.approx(minimum, abs=1e-6)
 
 
-def test_no_minimum_is_claimed_with_slopes_that_are_wrong() -> None:
+def test_no_minimum_is_reported_with_wrong_derivatives() -> None:
     claimed = 0
     for seed in SEEDS:
         A, b, _ = linear(seed)
@@ -268,8 +270,8 @@ def test_no_minimum_is_claimed_with_slopes_that_are_wrong() -> None:
     assert claimed == 0
 
 
-def test_no_minimum_is_claimed_when_the_steps_run_out() -> None:
-    """Along y = x^2 to x = 1000, which pulls ten million times less than the valley's walls."""
+def test_no_minimum_is_reported_when_the_steps_run_out() -> None:
+    """Along y = x^2 to x = 1000; the gradient along it is 1e-7 of that of the valley's walls."""
     far = np.array([1e7, 1e7])
     found = descend(
         lambda x: np.array([1e4 * (x[1] - x[0] ** 2), 1e-3 * (x[0] - 1e3)]),
@@ -280,7 +282,7 @@ def test_no_minimum_is_claimed_when_the_steps_run_out() -> None:
     assert "100 steps" in found.message
 
 
-def test_residuals_that_are_not_numbers_are_no_minimum() -> None:
+def test_residuals_of_nan_are_not_a_minimum() -> None:
     found = descend(
         lambda _: np.full(3, np.nan), lambda _: np.ones((3, 1)),
         np.array([1.0]), np.array([0.0]), np.array([2.0]),
@@ -288,12 +290,14 @@ def test_residuals_that_are_not_numbers_are_no_minimum() -> None:
     assert not found.converged
 
 
-def test_huber_s_loss_is_square_then_straight() -> None:
-    """Huber 1964: continuous in value and slope; the weight is the slope over twice r."""
+def test_the_huber_loss_is_quadratic_then_linear() -> None:
+    """Huber 1964: continuous in value and derivative; the weight is the derivative over 2 r."""
     r = np.array([0.5, -1.0, HUBER, 3.0, -10.0])
     assert loss(r[:2], HUBER) == loss(r[:2]) == 1.25
     assert loss(r[3:4], HUBER) == pytest.approx(2 * HUBER * 3 - HUBER**2)
     step = 1e-6
-    slope = [(loss(x + step, HUBER) - loss(x - step, HUBER)) / (2 * step) for x in r[:, np.newaxis]]
-    assert 2 * r * weights(r, HUBER) == pytest.approx(slope, abs=1e-5)
+    gradient = [
+        (loss(x + step, HUBER) - loss(x - step, HUBER)) / (2 * step) for x in r[:, np.newaxis]
+    ]
+    assert 2 * r * weights(r, HUBER) == pytest.approx(gradient, abs=1e-5)
     assert weights(r, None).tolist() == [1] * 5

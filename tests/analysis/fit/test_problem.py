@@ -1,4 +1,4 @@
-"""Least-squares problems: searches from a bound, and from all starting points."""
+"""Least-squares problems: a search does not end at a bound with zero derivative."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from tests.support.analysis.seeded_scan import noise_free, problem_of
 
 
 @pytest.mark.parametrize("name", ["oren_nayar_qualitative", "oren_nayar", "oren_nayar_exact"])
-def test_zero_roughness_is_no_trap(name: str) -> None:
-    """A surface changes with the square of its roughness: at 0 the slope is 0, up and down."""
+def test_the_search_leaves_zero_roughness(name: str) -> None:
+    """A surface depends on the square of its roughness: at 0 the derivative is 0."""
     truth = {"albedo": 0.7, "sigma_deg": 30.0}
     problem = problem_of(name, noise_free(name, truth))
     found = problem.solve(np.array([0.6, 0.0]))

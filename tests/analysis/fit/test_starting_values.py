@@ -11,16 +11,13 @@ from scipy.optimize import lsq_linear, nnls
 from analysis.fit.starting_values import bounded_least_squares, starting_values
 from analysis.models import MODELS
 from instrument.geometry import FloatArray
-from tests.support.analysis.seeded_scan import (
-    noise_free,
-    problem_of,
-)
+from tests.support.analysis.seeded_scan import noise_free, problem_of
 
-NO_END = 1e12
+UNBOUNDED = 1e12
 
 
 def stack(seed: int, columns: int, alike: float = 1.0) -> tuple[FloatArray, FloatArray]:
-    """Terms (20, 12, columns) that differ by the part `alike`, and data (20, 12)."""
+    """Terms (20, 12, columns) that differ by the fraction `alike`, and data (20, 12)."""
     rng = np.random.default_rng(seed)
     A = alike * rng.normal(size=(20, 12, columns)) + (1 - alike) * rng.normal(size=(20, 12, 1))
     return A * 10.0 ** rng.uniform(-3, 3, size=columns), rng.normal(size=(20, 12))
@@ -28,9 +25,9 @@ def stack(seed: int, columns: int, alike: float = 1.0) -> tuple[FloatArray, Floa
 
 @settings(derandomize=True, max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), columns=st.integers(1, 3))
-def test_scales_are_those_of_nnls(seed: int, columns: int) -> None:
+def test_scales_agree_with_nnls(seed: int, columns: int) -> None:
     A, b = stack(seed, columns)
-    found, left = bounded_least_squares(A, b, np.full(columns, NO_END))
+    found, left = bounded_least_squares(A, b, np.full(columns, UNBOUNDED))
     for n in range(len(b)):
         x, norm = nnls(A[n], b[n])
         np.testing.assert_allclose(found[n], x, rtol=1e-6, atol=1e-9 * np.max(x, initial=0))
@@ -39,22 +36,22 @@ def test_scales_are_those_of_nnls(seed: int, columns: int) -> None:
 
 @pytest.mark.parametrize("columns", [2, 3])
 @pytest.mark.parametrize("alike", [1e-3, 1e-6, 0.0])
-def test_terms_that_are_alike_explain_what_one_does(columns: int, alike: float) -> None:
-    """Within what the normal equations lose: a part `alike` of 1e-6 is 1e-12 of them."""
+def test_nearly_equal_terms_explain_as_much_as_one(columns: int, alike: float) -> None:
+    """To the precision of the normal equations: a difference of 1e-6 is 1e-12 of them."""
     for seed in range(5):
         A, b = stack(seed, columns, alike)
-        found, left = bounded_least_squares(A, b, np.full(columns, NO_END))
+        found, left = bounded_least_squares(A, b, np.full(columns, UNBOUNDED))
         assert np.all(found >= 0)
         for n in range(len(b)):
             _, norm = nnls(A[n], b[n])
             achieved = float(np.sum(np.square(A[n] @ found[n] - b[n])))
             assert left[n] == pytest.approx(achieved, rel=1e-3)
             assert norm**2 - 1e-9 <= achieved <= float(b[n] @ b[n]) + 1e-9
-            if alike != 1e-6:  # where rounding hides the difference, any share of it will do
+            if alike != 1e-6:  # where rounding hides the difference, any division will do
                 assert achieved == pytest.approx(norm**2, rel=1e-6)
 
 
-def test_one_scale_is_cut_at_its_bound() -> None:
+def test_a_single_scale_is_clipped_at_its_bound() -> None:
     A, b = stack(3, 1)
     high = np.array([0.1 / np.abs(A).mean()])
     found, left = bounded_least_squares(A, b, high)
@@ -64,7 +61,7 @@ def test_one_scale_is_cut_at_its_bound() -> None:
         assert left[n] == pytest.approx(2 * reference.cost, rel=1e-9)
 
 
-def test_several_scales_stay_within_their_bounds_and_left_is_what_they_leave() -> None:
+def test_several_scales_stay_within_bounds_and_the_remainder_is_theirs() -> None:
     for seed in range(20):
         A, b = stack(seed, 3)
         high = 0.3 / np.abs(A).mean(axis=(0, 1))
@@ -77,7 +74,7 @@ def test_several_scales_stay_within_their_bounds_and_left_is_what_they_leave() -
         assert np.mean(left / best) < 1.05  # good enough to begin with
 
 
-def test_terms_of_zeros_are_left_at_zero() -> None:
+def test_terms_of_zeros_get_scale_zero() -> None:
     found, left = bounded_least_squares(np.zeros((2, 5, 2)), np.ones((2, 5)), np.ones(2))
     assert found.tolist() == [[0, 0], [0, 0]]
     assert left.tolist() == [5, 5]
@@ -86,8 +83,8 @@ def test_terms_of_zeros_are_left_at_zero() -> None:
 @pytest.mark.parametrize(
     "name", ["oren_nayar_qualitative", "oren_nayar_qualitative+torrance_sparrow_lobe", "unified"]
 )
-def test_a_truth_on_the_grid_is_the_first_start(name: str) -> None:
-    """Of models that are sums of terms in proportion to their scales."""
+def test_a_truth_on_the_grid_is_the_first_starting_value(name: str) -> None:
+    """For sums of terms that are proportional to their scales."""
     parameters = MODELS[name].parameters
     truth = {p.name: 0.3 if p.scale else p.starts[3] for p in parameters}
     first, *others = starting_values(problem_of(name, noise_free(name, truth)), 3)
@@ -97,7 +94,7 @@ def test_a_truth_on_the_grid_is_the_first_start(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["lambert", "wolff", "eon+ggx", "unified"])
 @pytest.mark.parametrize("most", [1, 2, 5])
-def test_starts_lie_within_the_domain_and_off_zero(name: str, most: int) -> None:
+def test_starting_values_lie_within_the_domain_and_off_zero(name: str, most: int) -> None:
     m = noise_free("oren_nayar", {"albedo": 0.8, "sigma_deg": 35.0})
     problem = problem_of(name, m)
     found = starting_values(problem, most)

@@ -1,11 +1,11 @@
-"""Is what a fit says of itself true? Seeded scans of known surfaces, many of each.
+"""Coverage of the reported uncertainties: many seeded scans of known surfaces.
 
-Fitted with the true model: 95 % intervals hold the truth in 93.5 to 96.5 % of 2000 scans, and the
-estimates spread by at most 1.05 times the bound of Cramer and Rao. Through the whole choice: the
-right physics in 95 % of 500 scans once the extra term's part that the simpler model cannot follow,
-lambda = sum((part / u)^2), is 25; the simpler model in 95 % where there is none. `make test` runs
-a few of the scans, with limits as much wider as fewer scans know less; `pytest --slow` all. The
-figures are properties in what `--junitxml FILE` writes.
+Fitted with the true model: 95 % intervals cover the truth in 93.5 to 96.5 % of 2000 scans, and the
+standard deviation of the estimates is at most 1.05 times the Cramer-Rao bound. The whole choice:
+the right physics in 95 % of 500 scans once the part of the extra term that the simpler model cannot
+follow has lambda = sum((part / u)^2) = 25; the simpler model in 95 % without that term. `make test`
+runs some of the scans, with wider limits accordingly; `pytest --slow` runs all. The results are
+properties in the file that `--junitxml FILE` writes.
 """
 
 from __future__ import annotations
@@ -24,10 +24,7 @@ from analysis.fit.fit import FitResult, fit
 from analysis.fit.problem import Problem
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
-from tests.support.analysis.seeded_scan import (
-    RIG,
-    scan,
-)
+from tests.support.analysis.seeded_scan import RIG, scan
 
 
 def test_the_lobe_of_a_matte_sample_is_not_determined() -> None:
@@ -54,7 +51,7 @@ def test_a_value_on_its_bound_has_no_u() -> None:
     assert bound.undetermined == ()
 
 
-def test_one_geometry_does_not_tell_albedo_from_roughness() -> None:
+def test_one_geometry_does_not_determine_albedo_and_roughness() -> None:
     m = Measurements.bare([0.0] * 6, [0.0] * 6, 0.0, 0.2 + 1e-4 * np.arange(6), 2e-4)
     found = fit(MODELS["oren_nayar"], m)
     assert found.u["sigma_deg"] is None
@@ -84,7 +81,7 @@ TRUTHS: dict[str, dict[str, float]] = {
 }
 
 
-# The simpler surface, and what makes it the other one.
+# Simpler model and its parameters; right model and its parameters.
 STEPS = [
     ("lambert", {"albedo": 0.6}, "oren_nayar", {"albedo": 0.6, "sigma_deg": 25.0}),
     ("lambert", {"albedo": 0.6}, "wolff", {"single_scattering_albedo": 0.9, "n": 1.5}),
@@ -103,7 +100,7 @@ BOUNDED, FEW = 0.04, 0.01  # the share of the scans, and of the choices, that `m
 def scans(
     name: str, truth: Mapping[str, float], u_relative: float, count: int
 ) -> Iterator[Measurements]:
-    """Scans with normal noise, a seed each."""
+    """Scans with normal noise, each with its own seed."""
     f = MODELS[name].brdf(GEOMETRY, **truth)
     u = u_relative * f
     for seed in range(count):
@@ -119,7 +116,7 @@ def interval_95(result: FitResult, name: str) -> tuple[float, float]:
 
 
 def cramer_rao(name: str, truth: Mapping[str, float], u_relative: float) -> FloatArray:
-    """The least standard deviations that any unbiased estimate of the parameters can have."""
+    """Least standard deviations of any unbiased estimate of the parameters."""
     m = next(scans(name, truth, u_relative, 1))
     problem = Problem(MODELS[name], GEOMETRY, m.brdf, independent_covariance(m))
     J = problem.jacobian(np.array([truth[p.name] for p in MODELS[name].parameters]))
@@ -128,7 +125,7 @@ def cramer_rao(name: str, truth: Mapping[str, float], u_relative: float) -> Floa
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(TRUTHS))
-def test_intervals_hold_the_truth_and_estimates_spread_no_more_than_they_must(
+def test_intervals_cover_the_truth_and_estimates_reach_the_cramer_rao_bound(
     name: str, slow: bool, record_property: Callable[[str, object], None]
 ) -> None:
     share = 1.0 if slow else BOUNDED
@@ -147,7 +144,7 @@ def test_intervals_hold_the_truth_and_estimates_spread_no_more_than_they_must(
 
 
 def noise_for(simpler: str, right: str, truth: Mapping[str, float], noncentrality: float) -> float:
-    """The relative u at which the part that no method for `simpler` can follow has that lambda."""
+    """Relative u at which the part that no method for `simpler` can follow has this lambda."""
     f = MODELS[right].brdf(GEOMETRY, **truth)
     m = Measurements.bare(THETA_I, THETA_R, 0.0, f, 0.01 * f)
     methods = [name for name in LADDER if physics(name) == physics(simpler)]
@@ -157,7 +154,7 @@ def noise_for(simpler: str, right: str, truth: Mapping[str, float], noncentralit
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("simpler", "plain", "right", "truth"), STEPS)
-def test_the_choice_is_the_right_one_where_the_data_tell_and_the_simpler_one_where_not(
+def test_the_right_model_is_chosen_where_the_data_allow_and_else_the_simpler_one(
     simpler: str,
     plain: dict[str, float],
     right: str,

@@ -9,11 +9,7 @@ import pytest
 
 from analysis.report.data import group_sweeps
 from analysis.report.page import report_html
-from tests.support.analysis.report_data import (
-    data_of,
-    svgs,
-    without_tile,
-)
+from tests.support.analysis.report_data import data_of, svgs, without_tile
 
 
 class TestNoTile:
@@ -54,7 +50,7 @@ class TestSweeps:
         assert sweep.plane_deg == plane_deg
         np.testing.assert_array_equal(sweep.theta_r_deg, np.sort(sign * np.array([-20.0, 40.0])))
 
-    def test_angles_as_read_back_fall_into_their_settings(self) -> None:
+    def test_angles_read_back_with_jitter_fall_into_their_settings(self) -> None:
         data = data_of((30.0, 60.0), (0.0, 45.0))
         jitter = np.random.default_rng(1).uniform(-0.05, 0.05, (2, len(data.flags)))
         data = replace(

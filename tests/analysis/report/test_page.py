@@ -15,14 +15,7 @@ from analysis.report.data import Parameter, ReportData
 from analysis.report.page import report_html, write_report
 from instrument.errors import StorageError
 from instrument.record.reading import Preview
-from tests.support.analysis.report_data import (
-    NAN,
-    data_of,
-    png,
-    svgs,
-    without_tile,
-    words,
-)
+from tests.support.analysis.report_data import NAN, data_of, png, svgs, without_tile, words
 
 HOSTILE = "<script>alert('1')</script>\"&\x00\udc80 $\\frac$"
 
@@ -33,7 +26,7 @@ def page() -> str:
 
 
 class TestPage:
-    def test_needs_no_other_file_and_runs_nothing(self, page: str) -> None:
+    def test_is_self_contained_and_without_scripts(self, page: str) -> None:
         assert set(re.findall(r"https?://[^\s\"'<)]+", page)) == {"http://www.w3.org/2000/svg"}
         assert set(re.findall(r'(?:src|href)="(.)', page)) <= {"#", "d"}
         assert not re.search(r"<script|<link|@import|url\((?!#)|\son\w+=", page)
@@ -61,7 +54,7 @@ class TestPage:
     def test_is_small(self, page: str) -> None:
         assert len(page.encode()) < 300_000
 
-    def test_says_where_the_lamp_is_and_what_the_bars_are(self, page: str) -> None:
+    def test_labels_the_lamp_and_the_error_bars(self, page: str) -> None:
         text = words(page)
         for phrase in ("lamp’s side", "mirror side", "lamp 30°", "(k = 1)", "L(θᵣ) / L(0)", "1/sr"):
             assert phrase in text
@@ -72,7 +65,7 @@ class TestPage:
         assert "not determined, in [0, 0.123]" in page
         assert ">692.0<" in page
 
-    def test_fewest_sections_of_an_empty_report(self) -> None:
+    def test_an_empty_report_has_few_sections(self) -> None:
         none = np.array([])
         columns = ("theta_i_deg", "dphi_deg", "theta_r_deg", "brdf", "u_brdf", "radiance")
         texts = {"title": "t", "sample": "", "description": "", "verdict_kind": ""}
@@ -83,7 +76,7 @@ class TestPage:
         assert "<svg" not in page
 
 
-def test_hostile_texts_stay_texts() -> None:
+def test_hostile_texts_are_escaped() -> None:
     parameter = Parameter(HOSTILE, 1.0, 0.1, None, HOSTILE)
     model = replace(
         data_of().candidates[0],
@@ -119,14 +112,16 @@ def test_hostile_texts_stay_texts() -> None:
 
 
 class TestFile:
-    def test_is_written_whole_and_alone(self, tmp_path: Path) -> None:
+    def test_is_written_completely_without_leftovers(self, tmp_path: Path) -> None:
         path = tmp_path / "report.html"
         path.write_text("old")
         write_report(path, data_of(sample="caf\udce9"))  # a file name that was not UTF-8
         assert path.read_text(encoding="utf-8").endswith("</html>\n")
         assert list(tmp_path.iterdir()) == [path]
 
-    def test_old_one_survives(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_a_full_disk_keeps_the_old_report(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         path = tmp_path / "report.html"
         path.write_text("old")
 
@@ -141,7 +136,7 @@ class TestFile:
 
 
 class TestNoTile:
-    def test_shows_radiance_and_says_that_it_is_relative(self) -> None:
+    def test_shows_relative_radiance_and_notes_it(self) -> None:
         page = report_html(without_tile())
         assert "radiance is relative" in page
         assert "radiance (counts/s)" in page
@@ -151,7 +146,7 @@ class TestNoTile:
 
 class TestBrokenNumbers:
     @pytest.mark.parametrize("where", ["brdf", "u_brdf", "theta_r_deg", "theta_i_deg", "dphi_deg"])
-    def test_bad_numbers_spoil_no_other(self, where: str) -> None:
+    def test_bad_numbers_do_not_affect_others(self, where: str) -> None:
         data = data_of((30.0,))
         column = getattr(data, where).copy()
         column[1:6] = NAN, np.inf, -np.inf, 0.0, -1.0
@@ -160,7 +155,7 @@ class TestBrokenNumbers:
         assert len(svgs(page)) == 6
         assert "nan" not in words(page).lower()
 
-    def test_no_number_is_good(self) -> None:
+    def test_no_valid_number(self) -> None:
         data = data_of()
         bad = np.full(len(data.flags), NAN)
         columns: dict[str, Any] = dict.fromkeys(("brdf", "u_brdf", "radiance", "u_radiance"), bad)

@@ -1,4 +1,4 @@
-"""Numbers in the report."""
+"""Style of the report: numbers rounded to their uncertainty."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.report.style import format_value
-from tests.support.analysis.report_data import (
-    NAN,
-)
+from tests.support.analysis.report_data import NAN
 
 
 class TestFormatValue:

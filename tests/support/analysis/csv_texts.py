@@ -1,4 +1,4 @@
-"""Tables for the tests of the CSV reader, and how they are read: from the folder of the test."""
+"""CSV tables for the tests of the reader, written into the folder of the test."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ NAN = float("nan")
 
 
 def tilted(theta_i_deg: float, dphi_deg: float, theta_r_deg: FloatArray) -> FloatArray:
-    """A BRDF that grows towards the lamp's side, like a rough matte surface."""
+    """BRDF that rises towards the lamp's side, as of a rough matte surface."""
     towards = np.sin(np.radians(theta_r_deg)) * np.cos(np.radians(dphi_deg))
     return np.asarray(0.25 + 0.1 * np.sin(np.radians(theta_i_deg)) * towards)
 
@@ -111,7 +111,7 @@ def without_tile() -> ReportData:
 
 def svgs(page: str) -> list[ElementTree.Element]:
     found = re.findall(r"<svg\b.*?</svg>", page, flags=re.DOTALL)
-    return [ElementTree.fromstring(text) for text in found]  # our own text, made above
+    return [ElementTree.fromstring(text) for text in found]  # our own text
 
 
 def words(page: str) -> str:

@@ -1,4 +1,4 @@
-"""A seeded scan with known truth and known errors, for the tests of fit and choice."""
+"""Seeded scans with known truth and known errors, for the tests of fit and choice."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ GLOSSY = [(20.0, 0.8, 0.076), (42.0, 0.75, 0.34), (26.0, 0.70, 0.172)]
 
 
 def scan_angles() -> tuple[FloatArray, FloatArray, FloatArray]:
-    """3 incidences x 33 view angles, less those that the camera would keep from the lamp."""
+    """3 incidences x 33 view angles, less those where the camera would shade the sample."""
     theta_i = np.repeat([30.0, 45.0, 60.0], 33)
     theta_r = np.tile(np.linspace(-80, 80, 33), 3)
-    kept = np.abs(theta_i - theta_r) >= 3
-    return theta_i[kept], theta_r[kept], np.zeros(int(kept.sum()))
+    apart = np.abs(theta_i - theta_r) >= 3
+    return theta_i[apart], theta_r[apart], np.zeros(int(apart.sum()))
 
 
 def scan(
@@ -43,7 +43,7 @@ def scan(
     acceptance: Acceptance | None = None,
     **truth: float,
 ) -> Measurements:
-    """What a rig with those uncertainties would measure of a sample that obeys the model."""
+    """Simulated measurements with these uncertainties, of a sample that obeys the model."""
     rng = np.random.default_rng(seed)
     theta_i, theta_r, dphi = scan_angles()
     setting = setting_numbers(theta_i, dphi)
@@ -70,6 +70,7 @@ def scan(
 
 
 def noise_free(name: str, truth: dict[str, float]) -> Measurements:
+    """Exact values of a model at the angles of the scan, with a stated u of 0.1 %."""
     theta_i, theta_r, dphi = scan_angles()
     geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
     value = MODELS[name].brdf(geometry, **truth)
@@ -77,13 +78,14 @@ def noise_free(name: str, truth: dict[str, float]) -> Measurements:
 
 
 def problem_of(name: str, m: Measurements) -> Problem:
+    """Fit of a model to measurements, with their independent uncertainties."""
     assert m.u_random is not None
     C = Covariance(np.square(m.u_random), np.zeros((m.size, 0)))
     return Problem(MODELS[name], m.geometry, m.brdf, C)
 
 
 def three_sweeps(order: FloatArray | None = None) -> Measurements:
-    """96 points; `order`: the order in which they were measured."""
+    """Scan of 96 points; `order`: the order in which they were measured."""
     theta_i, theta_r, dphi = scan_angles()
     chosen = np.arange(theta_i.size) if order is None else np.argsort(order)
     return Measurements.bare(theta_i[chosen], theta_r[chosen], dphi[chosen], 0.2, 1e-3)
