@@ -26,6 +26,7 @@ from acquisition.rig import check_ready
 from acquisition.terminal.operator import require_yes
 from instrument.config.load import Loaded, load_protocol
 from instrument.errors import OperatorStop
+from instrument.record.event_kinds import FAULT, RESUMED, STOPPED
 from instrument.record.record import Record
 
 
@@ -116,7 +117,7 @@ def _finish(record: Record, loaded: Loaded, as_json: bool) -> None:
 
 def _confirm(yes: bool, steps: int, record: Record) -> None:
     """Ask whether the rig may move, unless `yes` says so; record who answered."""
-    ends = [(kind, why) for _, kind, why in record.events() if kind in ("fault", "stopped")]
+    ends = [(kind, why) for _, kind, why in record.events() if kind in (FAULT, STOPPED)]
     if not yes:
         last = f"The scan ended with: {ends[-1][1]}\n" if ends else ""
         require_yes(
@@ -125,4 +126,4 @@ def _confirm(yes: bool, steps: int, record: Record) -> None:
             "not resumed: nothing has moved",
         )
     how = "--yes" if yes else "yes, asked at the terminal"
-    record.add_event(datetime.now(UTC).isoformat(), "resumed", f"the rig may move: {how}")
+    record.add_event(datetime.now(UTC).isoformat(), RESUMED, f"the rig may move: {how}")

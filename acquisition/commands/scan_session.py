@@ -14,6 +14,7 @@ from acquisition.terminal.console import console, duration_text, progress_bar
 from instrument.clock import Clock, SystemClock
 from instrument.config.load import Loaded
 from instrument.errors import DeviceError, OperatorStop, StorageError
+from instrument.record.event_kinds import FAULT, FINISHED, STOPPED
 from instrument.record.record import Record
 
 
@@ -30,14 +31,14 @@ def scan(loaded: Loaded, plan: Plan, record: Record, progress: Progress | None =
                 _drive(loaded, plan, record, progress, devices, notes)
         except (KeyboardInterrupt, OperatorStop) as stop:
             why = str(stop) or "stopped by the operator"
-            _write_down(record, notes, clock, "stopped", why)
+            _write_down(record, notes, clock, STOPPED, why)
             ended = "" if notes.troubles else ": all motion has ended."
             raise OperatorStop(f"{why}{ended} {_go_on(record, notes)}") from None
         except (DeviceError, StorageError) as error:
-            _write_down(record, notes, clock, "fault", str(error))
+            _write_down(record, notes, clock, FAULT, str(error))
             raise type(error)(f"{error}\n{_go_on(record, notes)}") from error
         except Exception as error:
-            _write_down(record, notes, clock, "fault", f"the program failed: {error!r}")
+            _write_down(record, notes, clock, FAULT, f"the program failed: {error!r}")
             raise
 
 
@@ -61,7 +62,7 @@ def _drive(
         told = _both(show, notes)
         Engine(loaded.protocol, loaded.rig, devices, record, told).run(plan, progress)
     notes.write()
-    record.add_event(clock.utc().isoformat(), "finished", f"{len(plan.steps)} steps")
+    record.add_event(clock.utc().isoformat(), FINISHED, f"{len(plan.steps)} steps")
     record.set_meta("scan_s", f"{clock.now_s() - begun_s:.1f}")
     record.set_meta("finished_utc", clock.utc().isoformat(timespec="seconds"))
     console.print(_unsafe(notes), end="", highlight=False, soft_wrap=True)

@@ -11,7 +11,7 @@ from analysis.report.data import Parameter
 from analysis.report.style import format_value
 from instrument.config.load import Loaded
 from instrument.geometry import FloatArray
-from instrument.record.event_kinds import RETRY
+from instrument.record.event_kinds import RESUMED, RETRY
 from instrument.record.record import Record
 
 Budget = tuple[tuple[str, float, float], ...]
@@ -129,7 +129,7 @@ def _unfinished_note(record: Record) -> str:
 def _interruptions_note(record: Record) -> str:
     """How often the scan went on after a stop, what the lamp had done, and what was tried again."""
     kinds = [kind for _, kind, _ in record.events()]
-    resumed, retries = kinds.count("resumed"), kinds.count(RETRY)
+    resumed, retries = kinds.count(RESUMED), kinds.count(RETRY)
     jumps = sum(check.jumped for check in record.checks())
     texts = (
         f"the scan was interrupted {resumed} times" if resumed else "",
