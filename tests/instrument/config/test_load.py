@@ -3,13 +3,12 @@
 from pathlib import Path
 
 import pytest
-import yaml
 
 from instrument.config.axes import HandAxis
 from instrument.config.load import MAX_REPORTED, load_protocol, load_rig
-from instrument.config.protocol import Protocol, Steps
+from instrument.config.protocol import Steps
 from instrument.errors import InputError
-from tests.support.config.mistakes import PROTOCOL_MISTAKES, RIG_MISTAKES
+from tests.support.config.mistakes import CHECK_MISTAKES, PROTOCOL_MISTAKES, RIG_MISTAKES
 from tests.support.config.texts import PROTOCOL, RIG, changed, load, problems
 
 
@@ -118,11 +117,11 @@ def test_many_mistakes_at_once_in_order_of_file_and_line() -> None:
     protocol, rig = PROTOCOL, RIG
     lines = []
     for kind in ("empty text", "too small", "incidence past the axis", "num 0", "octal"):
-        old, new, message = PROTOCOL_MISTAKES[kind]
+        old, new, message = (PROTOCOL_MISTAKES | CHECK_MISTAKES)[kind]
         protocol = changed(protocol, old, new)
         lines.append(f"protocol.yaml:{message}")
     for kind in ("too large", "drift check past the axis", "unknown model", "not finite"):
-        old, new, message = PROTOCOL_MISTAKES[kind]
+        old, new, message = (PROTOCOL_MISTAKES | CHECK_MISTAKES)[kind]
         protocol = changed(protocol, old, new)
         lines.append(f"protocol.yaml:{message}")
     for kind in ("limits swapped", "range of one", "exposures swapped"):
@@ -139,8 +138,3 @@ def test_empty_and_odd_files() -> None:
     assert message_of(Path("list.yaml")).startswith("list.yaml:1:1: the file is a list")
     Path("latin.yaml").write_bytes(b"name: caf\xe9\n")
     assert message_of(Path("latin.yaml")).startswith("latin.yaml:1:10: byte 0xe9 is not UTF-8")
-
-
-def test_the_same_schema_guards_python_callers() -> None:
-    with pytest.raises(ValueError, match="at least 3 items"):
-        Protocol.model_validate({**yaml.safe_load(PROTOCOL), "sweeps": [{"dphi_deg": [0.0]}]})

@@ -201,6 +201,31 @@ PROTOCOL_MISTAKES = {
         "num: 33}\n  - {}\n",
         "8:5: sweeps[1]: an empty sweep; allowed: a block with theta_i_deg, dphi_deg, theta_r_deg",
     ),
+    "tile past the geometry": (
+        "0.005, theta_r_deg: 10.0",
+        "0.005, theta_r_deg: 95.0",
+        "12:70: references.white_tile.theta_r_deg: 95.0 is too large; allowed: a number"
+        " from -89.5 to 89.5",
+    ),
+    "rig not there": (
+        "rig: rig.yaml",
+        "rig: rigg.yaml",
+        "2:6: rig: rigg.yaml: no such file; in . there is rig.yaml",
+    ),
+    "rig with a name that no system takes": (
+        "rig: rig.yaml",
+        'rig: "a\\0b"',
+        "2:6: rig: 'a\\x00b' holds a control character (\\x00); remove it",
+    ),
+    "keys called like forms": (
+        "sigma_deg: 20",
+        "steps: x",
+        "18:36: simulated_sample.parameters.steps: 'x' is text; allowed: a number",
+    ),
+}
+
+# Across values of a protocol, and against its rig.
+CHECK_MISTAKES = {
     "incidence past the geometry": (
         "60.0]",
         "95.0]",
@@ -240,12 +265,6 @@ PROTOCOL_MISTAKES = {
         "{theta_r_deg: -89.0, every",
         "13:30: references.drift_check.theta_r_deg: -89 deg is past the limits of axis theta_r;"
         " allowed: -88 to 88 deg (rig.yaml:10)",
-    ),
-    "tile past the geometry": (
-        "0.005, theta_r_deg: 10.0",
-        "0.005, theta_r_deg: 95.0",
-        "12:70: references.white_tile.theta_r_deg: 95.0 is too large; allowed: a number"
-        " from -89.5 to 89.5",
     ),
     "window past the sample": (
         "{width_mm: 20.0",
@@ -296,23 +315,7 @@ PROTOCOL_MISTAKES = {
         "1:1: simulated_sample: is missing; the rig rig.yaml is simulated and needs a sample to"
         " render",
     ),
-    "rig not there": (
-        "rig: rig.yaml",
-        "rig: rigg.yaml",
-        "2:6: rig: rigg.yaml: no such file; in . there is rig.yaml",
-    ),
-    "rig with a name that no system takes": (
-        "rig: rig.yaml",
-        'rig: "a\\0b"',
-        "2:6: rig: 'a\\x00b' holds a control character (\\x00); remove it",
-    ),
-    "keys called like forms": (
-        "sigma_deg: 20",
-        "steps: x",
-        "18:36: simulated_sample.parameters.steps: 'x' is text; allowed: a number",
-    ),
 }
-
 
 DRIVERS = "hand or newport or oriental or simulated or zaber"
 
