@@ -1,8 +1,7 @@
-"""`gonio home`, `move`, `grab`, `devices`; and the operator at the terminal."""
+"""`gonio home`, `move`, `grab` and `devices`."""
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import pty
@@ -16,11 +15,10 @@ import cv2
 import numpy as np
 import pytest
 
-from acquisition.terminal.operator import TerminalOperator
 from drivers.manual import HandSetAxis
 from instrument.config.load import load_rig
 from instrument.devices import Request
-from instrument.errors import InputError, OperatorStop
+from instrument.errors import InputError
 from tests.support.command import gonio_here as gonio
 from tests.support.paths import CONFIGS, ROOT
 
@@ -98,27 +96,6 @@ def test_an_angle_that_is_off_is_asked_for_again() -> None:
     assert axis.wait() == 30.5
     assert "'35' is not within 0.75 degrees of 30" in operator.asked[1]
     assert "'thirty' is not within 0.75 degrees of 30" in operator.asked[2]
-
-
-@pytest.mark.parametrize(
-    ("typed", "answer"), [("\n", "done"), ("30.2\n", "30.2"), ("  29,9 \n", "29,9")]
-)
-def test_the_operator_answers_at_the_terminal(
-    monkeypatch: pytest.MonkeyPatch, typed: str, answer: str
-) -> None:
-    monkeypatch.setattr(sys, "stdin", io.StringIO(typed))
-    request = Request("set axis", "Set the lamp to 30 degrees", axis="theta_i", angle_deg=30.0)
-    assert TerminalOperator().ask(request) == answer
-
-
-@pytest.mark.parametrize(("typed", "says"), [("q\n", "stopped at the prompt: Put foam"),
-                                             ("", "nobody answers")])  # fmt: skip
-def test_the_operator_may_stop_or_be_gone(
-    monkeypatch: pytest.MonkeyPatch, typed: str, says: str
-) -> None:
-    monkeypatch.setattr(sys, "stdin", io.StringIO(typed))
-    with pytest.raises(OperatorStop, match=says):
-        TerminalOperator().ask(Request("place", "Put foam on the sample table"))
 
 
 REAL_RIG = """

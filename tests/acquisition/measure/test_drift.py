@@ -1,16 +1,94 @@
-"""Drift of the lamp: levels and interpolation between the checks of a block."""
+"""Drift of the lamp: interpolated between checks, extrapolated beyond, referred anew by a jump."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from acquisition.measure.drift import Drift, rate
+from acquisition.measure.drift import Drift, is_usable, rate
+from instrument.record.reading import Check, Reading
 from instrument.record.record import Record
 from tests.support.scans import small_scan
 from tests.support.stopped_scan import scan
+
+
+def check(step: int, time_s: float, signal_dn: float, flags: str = "") -> Reading:
+    """A drift check of 1 s exposure, its noise a thousandth of 1000 DN."""
+    return Reading(
+        step=step, kind="drift", surface="sample", theta_i_deg=30.0, dphi_deg=0.0,
+        theta_r_deg=10.0, lamp_setting=0, block=0, signal_dn=signal_dn, u_noise_dn=1.0,
+        u_quantisation_dn=0.0, u_dark_dn=0.0, u_placement_dn=0.0, u_texture_dn=0.0,
+        exposure_s=1.0, frames=4, window_pixels=100.0, saturated_pixels=0, peak_dn=signal_dn,
+        time_s=time_s, free_s=time_s, time_utc="", flags=flags,
+    )  # fmt: skip
+
+
+CHECKS = [check(0, 10.0, 1000.0), check(5, 20.0, 980.0), check(9, 40.0, 960.0)]
+JUMP = Check(
+    before_step=5, expected=1000.0, u_expected=1.0, jumped=True, reading=check(0, 12.0, 800.0)
+)
+
+
+def test_levels_are_interpolated_and_extrapolated_by_the_mean_trend() -> None:
+    drift = Drift.of(CHECKS, 0)
+    assert drift.level.tolist() == [1.0, 0.98, 0.96]
+    assert drift.at(15.0) == pytest.approx(0.99)
+    assert drift.at(30.0) == pytest.approx(0.97)
+    # From first to last check the level falls by 0.04 in 30 s.
+    assert drift.at(55.0) == pytest.approx(0.94)
+    assert drift.u_extrapolated(55.0) == pytest.approx(0.01)
+    assert drift.u_extrapolated(30.0) == 0.0
+
+
+def test_a_level_is_the_weighted_mean_of_its_two_checks() -> None:
+    drift = Drift.of(CHECKS, 0)
+    times_s = np.array([5.0, 10.0, 15.0, 20.0, 35.0, 50.0])
+    before, weight = drift.interpolation(times_s)
+    assert before.tolist() == [0, 0, 0, 1, 1, 2]
+    assert weight == pytest.approx([0.0, 0.0, 0.5, 0.0, 0.75, 0.0])
+
+
+def test_levels_after_a_jump_refer_to_the_first_check_of_all() -> None:
+    drift = Drift.of([CHECKS[0], check(5, 20.0, 790.0), check(9, 40.0, 770.0)], 0, [JUMP])
+    assert drift.level.tolist() == pytest.approx([1.0, 0.8, 0.79, 0.77])
+    assert drift.at(11.0) == 1.0  # before the jump nothing is interpolated towards it
+    assert drift.at(16.0) == pytest.approx(0.795)
+    before, weight = drift.interpolation(np.array([11.0, 16.0]))
+    assert (before.tolist(), weight.tolist()) == ([0, 1], [0.0, 0.5])
+
+
+def test_a_check_is_predicted_with_its_noise_and_half_of_the_extrapolation() -> None:
+    rate, u_relative = Drift.of(CHECKS, 0).predicted_rate(55.0)
+    assert rate == pytest.approx(940.0)
+    assert u_relative == pytest.approx(math.hypot(1 / 960, 0.01))
+
+
+def test_without_usable_checks_the_level_is_1() -> None:
+    drift = Drift.of([check(0, 10.0, 1000.0, "saturated"), check(5, 20.0, 9.0)], 0)
+    assert drift.level.size == 0
+    assert (drift.at(15.0), drift.u_extrapolated(15.0)) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("signal_dn", "flags", "usable"), [(11, "", True), (9, "", False), (11, "saturated", False)]
+)
+def test_a_usable_check_has_no_flag_and_ten_u_of_signal(
+    signal_dn: float, flags: str, usable: bool
+) -> None:
+    assert is_usable(check(0, 0.0, signal_dn, flags)) == usable
+
+
+def test_levels_of_a_simulated_scan_are_those_at_its_checks(whole: list[Reading]) -> None:
+    drifts = [r for r in whole if r.kind == "drift" and r.block == 0]
+    assert len(drifts) > 2
+    plain = Drift.of(whole, 0)
+    assert plain.level[0] == 1.0
+    assert plain.at(drifts[1].time_s) == pytest.approx(plain.level[1])
+    before, weight = plain.interpolation(np.array([drifts[1].time_s]))
+    assert (before.tolist(), weight.tolist()) == ([1], [0.0])
 
 
 def test_levels_are_those_of_the_checks(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Window means, their uncertainty and their flags, on frames whose truth is known."""
+"""Window means, their uncertainty and their flags, on synthetic frames."""
 
 from __future__ import annotations
 
@@ -71,8 +71,8 @@ def test_a_single_frame_takes_its_noise_from_the_photon_transfer_curve() -> None
 
 
 @pytest.mark.parametrize("sd", [0.0, 0.1, 0.2, 0.3, 0.5])
-def test_rounding_leaves_what_the_fourier_series_says(sd: float) -> None:
-    """Against the mean of rounded normal noise itself, worked out with its distribution."""
+def test_the_rounding_error_is_that_of_the_fourier_series(sd: float) -> None:
+    """Compare with the mean of rounded normal noise, computed from its distribution."""
     levels = np.arange(0.0005, 1, 0.001)
     counts = np.arange(-9, 11)
     edges = (np.append(counts - 0.5, counts[-1] + 0.5) - levels[:, None]) / max(sd, 1e-9)
@@ -91,8 +91,8 @@ def test_more_noise_means_less_rounding_error(a: float, b: float) -> None:
     assert rounding_u_dn(high) <= rounding_u_dn(low)
 
 
-def test_a_misplaced_sample_counts_by_the_slope_of_the_picture() -> None:
-    """A picture that brightens along its rows, seen from the side, by a sample 1 mm too near."""
+def test_the_effect_of_a_misplaced_sample_follows_the_gradient_of_the_image() -> None:
+    """An image that brightens along its rows, seen obliquely, of a sample 1 mm too close."""
     window, camera = _window(60.0), Pinhole.of(RIG)
     ramp = np.broadcast_to(1000 + 2 * np.arange(SHAPE[1]), SHAPE).astype(np.uint16)
     dark = Dark(0.01, np.full(SHAPE, 64.0), np.zeros(SHAPE), 8)
@@ -121,7 +121,7 @@ def test_the_shift_of_a_misplaced_sample_turns_with_the_camera(roll_deg: float) 
         (1500, 20.0, 0.0, ""),
     ],
 )
-def test_what_is_wrong_is_flagged(level: int, size: float, theta_r: float, flag: str) -> None:
+def test_every_defect_is_flagged(level: int, size: float, theta_r: float, flag: str) -> None:
     frames = [Frame(np.full(SHAPE, level, np.uint16), 0.01, 0.0)] * 2
     signal = measure(frames, _dark(), _window(theta_r, size), CAMERA, 0.0, 100)
     assert signal.flags == flag

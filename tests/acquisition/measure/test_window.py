@@ -1,4 +1,4 @@
-"""The measuring window: always the same patch, and its mean is the radiance of that patch."""
+"""Measuring window: always the same patch, and its mean is the radiance of that patch."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_the_weights_are_the_same_area_at_every_view_angle(theta_r: float) -> No
     assert np.tensordot(weights, points, axes=2) == pytest.approx([0.0, 0.0], abs=5e-3)
 
 
-def test_the_window_shrinks_with_the_cosine_and_says_when_it_leaves_the_frame() -> None:
+def test_the_window_shrinks_with_the_cosine_and_reports_leaving_the_frame() -> None:
     demo = load_protocol(CONFIGS / "protocols/demo.yaml")
     camera = Pinhole.of(demo.rig)
     normal, steep = (window_at(t, camera, 20.0, 20.0).pixels for t in (0.0, 60.0))

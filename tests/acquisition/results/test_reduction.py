@@ -1,8 +1,9 @@
-"""Reduction of readings: noise of the drift checks as an error that points share."""
+"""Reduction of readings: lamp drift and its noise taken into account; any part is reducible."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,13 +12,18 @@ from acquisition.results.reduction import DRIFT, reduce
 from instrument.config.load import Loaded
 from instrument.record.reading import Check, Reading
 from instrument.record.record import Record
-from tests.support.scans import small_scan
+from tests.support.scans import changed, small_scan
 from tests.support.stopped_scan import scan
 
 
 @pytest.fixture(scope="module")
 def small() -> Loaded:
     return small_scan("paper_1995")  # a lamp set by hand: two blocks, each with its checks
+
+
+@pytest.fixture(scope="module")
+def full() -> Loaded:
+    return small_scan(shrink=1)  # all pixels of the camera
 
 
 @pytest.fixture(scope="module")
@@ -69,3 +75,33 @@ def test_without_usable_checks_there_is_no_drift_noise(
 ) -> None:
     readings = [replace(r, flags="saturated") if r.kind == "drift" else r for r in resumed[0]]
     assert DRIFT not in reduce(readings, small.protocol, ()).parts
+
+
+def test_drift_is_followed_and_taken_out(full: Loaded, tmp_path: Path) -> None:
+    brdf = []
+    for drift in (0.0, 0.9):  # of the lamp, in an hour: 9 % over this scan
+        simulation = full.rig.simulation.model_copy(update={"lamp_drift_per_hour": drift})
+        loaded = changed(full, rig={"simulation": simulation})
+        with Record.create(tmp_path / str(drift), {}) as record:
+            scan(loaded, record)
+            brdf.append(reduce(record.readings(), loaded.protocol, ()).brdf)
+    assert brdf[1] == pytest.approx(brdf[0], rel=2e-3)
+    # Not corrected, sample and tile differ by what the lamp did between them.
+    raw = _reduced_without_checks(full, tmp_path / "0.9")
+    assert np.min(raw / brdf[0]) > 1.01
+
+
+def _reduced_without_checks(loaded: Loaded, folder: Path) -> np.ndarray:
+    with Record.open(folder) as record:
+        readings = [r for r in record.readings() if r.kind != "drift"]
+        return reduce(readings, loaded.protocol, ()).brdf
+
+
+def test_a_scan_cut_at_any_step_can_be_reduced(full: Loaded, tmp_path: Path) -> None:
+    with Record.create(tmp_path / "run", {}) as record:
+        scan(full, record)
+        readings = record.readings()
+    for count in range(len(readings) + 1):
+        reduced = reduce(readings[:count], full.protocol, ())
+        assert len(reduced.flags) == len(reduced.points)
+        assert np.all(np.isfinite(reduced.brdf[reduced.sound]))
