@@ -1,9 +1,9 @@
-"""Speed of the printed forms and of Beckmann's sum; what is timed is checked to be right.
+"""Speed of the printed forms and of Beckmann's sum; the timed values are checked.
 
 Limits are ratios within one run: a formula's time per geometry over that of a ruler, sin(x) +
-cos(x) of as many angles. The ruler is vectorised differently on each processor, so the limits leave
-room: the qualitative form took 1.7 rulers on an Intel core with AVX-512 and 1.9 to 2.2 on an AMD
-one without, the functional form 3.4 and 3.7.
+cos(x) of as many angles. The ruler is vectorised differently on each processor, so the limits have
+a margin: the qualitative form took 1.7 rulers on an Intel core with AVX-512 and 1.9 to 2.2 on an
+AMD one without, the functional form 3.4 and 3.7.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import pytest
 
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
+from tests.support.models.printed_forms import printed_functional, printed_qualitative
 
 SIZE = 1 << 18
 
@@ -44,20 +45,7 @@ def in_rulers(name: str, geometry: Geometry) -> tuple[float, FloatArray]:
     return min(formula) / min(ruler), found
 
 
-def printed(name: str, geometry: Geometry, k: int) -> float:
-    """1995 (33) + (34), or (36), of one geometry, typed from the paper; over E0 cos(theta_i)."""
-    i, r, phi = (
-        math.radians(a[k]) for a in (geometry.theta_i_deg, geometry.theta_r_deg, geometry.dphi_deg)
-    )
-    a, b, c, s2, rho = max(i, r), min(i, r), math.cos(phi), math.radians(30) ** 2, 0.8
-    c1, c2 = 1 - 0.5 * s2 / (s2 + 0.33), 0.45 * s2 / (s2 + 0.09)
-    if name == "oren_nayar_qualitative":
-        return rho / math.pi * (c1 + c2 * max(0.0, c) * math.sin(a) * math.tan(b))
-    c2 *= math.sin(a) - (0 if c >= 0 else (2 * b / math.pi) ** 3)
-    c3 = 0.125 * (s2 / (s2 + 0.09)) * (4 * a * b / math.pi**2) ** 2
-    direct = c1 + c * c2 * math.tan(b) + (1 - abs(c)) * c3 * math.tan((a + b) / 2)
-    twice = 0.17 * rho * s2 / (s2 + 0.13) * (1 - c * (2 * b / math.pi) ** 2)
-    return rho / math.pi * (direct + twice)
+PRINTED = {"oren_nayar": printed_functional, "oren_nayar_qualitative": printed_qualitative}
 
 
 @pytest.mark.parametrize(("name", "limit"), [("oren_nayar_qualitative", 3.0), ("oren_nayar", 6.0)])
@@ -65,7 +53,9 @@ def test_the_printed_forms_are_fast(name: str, limit: float) -> None:
     geometry = geometries()
     rulers, found = in_rulers(name, geometry)
     for k in range(0, SIZE, SIZE // 50):
-        assert found[k] == pytest.approx(printed(name, geometry, k), rel=1e-12, abs=1e-14)
+        angles = (a[k] for a in (geometry.theta_i, geometry.theta_r, np.radians(geometry.dphi_deg)))
+        expected = PRINTED[name](*angles, 0.8, math.radians(30.0))
+        assert found[k] == pytest.approx(expected, rel=1e-12, abs=1e-14)
     assert rulers <= limit
 
 

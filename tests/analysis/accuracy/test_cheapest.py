@@ -16,7 +16,7 @@ from analysis.models.rough.form_error_table import LIMIT_DEG
 from analysis.models.rough.oren_nayar_exact import FINE, clear_profile_cache, oren_nayar_exact_brdf
 from instrument.geometry import Geometry
 from tests.support.cpu_time import cpu_seconds
-from tests.support.method_scenes import FAMILIES, angles, drawn_ranges, within
+from tests.support.models.method_scenes import FAMILIES, angles, drawn_ranges, within
 
 Random = np.random.Generator
 

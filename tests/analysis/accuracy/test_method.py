@@ -11,7 +11,7 @@ from analysis.models.rough.oren_nayar_exact import clear_profile_cache
 from analysis.models.smooth import wolff
 from instrument.geometry import Geometry
 from tests.support.cpu_time import cpu_seconds
-from tests.support.method_scenes import FAMILIES, angles, drawn_ranges, within
+from tests.support.models.method_scenes import FAMILIES, angles, drawn_ranges, within
 
 
 @pytest.mark.parametrize("name", FAMILIES)

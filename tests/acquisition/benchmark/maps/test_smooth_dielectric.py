@@ -6,7 +6,7 @@ import numpy as np
 
 from acquisition.benchmark.maps.smooth_dielectric import SMOOTH_DIELECTRIC
 from analysis.accuracy.cheapest import cheapest
-from tests.support.method_scenes import angles
+from tests.support.models.method_scenes import angles
 
 
 def test_a_low_order_saves_time_for_few_geometries_only() -> None:

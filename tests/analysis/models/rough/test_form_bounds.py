@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.accuracy.rough_surface import ROUGH_SURFACE
-from tests.support.method_scenes import angles, drawn_ranges, within
+from tests.support.models.method_scenes import angles, drawn_ranges, within
 
 
 @settings(max_examples=8)

@@ -9,7 +9,7 @@ from analysis.models import MODELS
 from analysis.models.rough.form_error import form_error
 from analysis.models.rough.form_error_table import ERROR
 from instrument.geometry import FloatArray, Geometry
-from tests.support.model_geometries import table_geometries
+from tests.support.models.geometries import special_directions
 
 FORMS = ("lambert", "oren_nayar_qualitative", "oren_nayar")
 
@@ -24,7 +24,7 @@ def by_integration(name: str, geometry: Geometry, albedo: float, sigma_deg: floa
 @pytest.mark.parametrize("sigma_deg", [0.0, 0.4, 2.2, 3.0, 7.0, 23.0, 41.0, 60.0])
 @pytest.mark.parametrize("albedo", [0.02, 1.0])
 def test_form_error_is_that_against_the_integral(sigma_deg: float, albedo: float) -> None:
-    geometry = table_geometries(1500)
+    geometry = special_directions(1500)
     for name in FORMS:
         found = form_error(name, geometry, albedo, sigma_deg)
         expected = by_integration(name, geometry, albedo, sigma_deg)

@@ -21,13 +21,16 @@ from analysis.models.rough.oren_nayar_exact import (
     slope_kinks,
 )
 from instrument.geometry import FloatArray, Geometry
-from tests.analysis.models.rough.test_v_cavity import GEOMETRIES, printed_mean
+from tests.support.models.derivatives import central_difference
+from tests.support.models.geometries import (
+    exchanged,
+    special_directions,
+)
+from tests.support.models.v_cavity_reference import GEOMETRIES, printed_mean
 
 EXACT = MODELS["oren_nayar_exact"]
+
 SIGMAS_DEG = np.array([0.5, 1.0, 3.0, 7.0, 15.0, 30.0, 45.0, 60.0])
-
-
-# The Gaussian surface
 
 
 def reference(theta_i: float, theta_r: float, dphi: float) -> FloatArray:
@@ -59,17 +62,6 @@ def test_exact_to_1e_6_from_smooth_to_very_rough(angles: tuple[float, float, flo
             assert got == pytest.approx(expected, rel=1e-6)
 
 
-def scattered(count: int, limit: float = 85.0) -> Geometry:
-    """Geometries all over the domain; a third in the plane of incidence, some equal angles."""
-    random = np.random.default_rng(5)
-    theta_i, theta_r = random.uniform(0, limit, (2, count))
-    dphi = random.uniform(0, 360, count)
-    dphi[::6], dphi[3::6] = 0, 180
-    theta_r[::7] = theta_i[::7]
-    theta_i[1::5] = random.uniform(limit - 5, limit, theta_i[1::5].size)
-    return Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
-
-
 def nearly_special(count: int) -> Geometry:
     """Near 85 degrees, and 1e-10 to 10 degrees from equal angles, the plane, or square to it."""
     random = np.random.default_rng(8)
@@ -84,8 +76,8 @@ def nearly_special(count: int) -> Geometry:
 
 
 @pytest.mark.parametrize(("rule", "accuracy"), [(COARSE, 1e-4), (RULE, 1e-6), (FINE, 1e-8)])
-def test_the_rules_keep_what_they_promise(rule: Rule, accuracy: float) -> None:
-    for geometry in (scattered(400), nearly_special(400)):
+def test_the_rules_keep_their_stated_accuracy(rule: Rule, accuracy: float) -> None:
+    for geometry in (special_directions(400), nearly_special(400)):
         for sigma in (0.5, 5.0, 20.0, 60.0):
             best = oren_nayar_exact_brdf(geometry, 1.0, sigma, Rule(30, 18, 48))
             got = oren_nayar_exact_brdf(geometry, 1.0, sigma, rule)
@@ -120,7 +112,7 @@ def test_reciprocal_finite_and_not_negative(
     theta_i: float, theta_r: float, dphi: float, sigma_deg: float
 ) -> None:
     there = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
-    back = Geometry.from_degrees(theta_i=theta_r, theta_r=theta_i, dphi=dphi)
+    back = exchanged(there)
     value = EXACT.brdf(there, albedo=0.8, sigma_deg=sigma_deg)
     assert np.isfinite(value)
     assert value >= 0
@@ -143,14 +135,14 @@ def test_finite_at_every_corner_of_the_closed_domain() -> None:
 
 
 @pytest.mark.parametrize("sigma_deg", [0.0, 1e-9, 1e-3])
-def test_a_smooth_surface_is_lamberts(sigma_deg: float) -> None:
-    geometry = scattered(200, 80)
+def test_a_smooth_surface_is_lambertian(sigma_deg: float) -> None:
+    geometry = special_directions(200, 80)
     got = EXACT.brdf(geometry, albedo=0.7, sigma_deg=sigma_deg)
     np.testing.assert_allclose(got, 0.7 / np.pi, rtol=1e-7)
 
 
 @pytest.mark.parametrize("sigma_deg", [1.0, 20.0, 60.0])
-def test_no_more_light_leaves_than_comes(sigma_deg: float) -> None:
+def test_no_more_light_leaves_than_arrives(sigma_deg: float) -> None:
     """At normal incidence the energy of one bounce is known: all facets are lit, and the part
     1 - cos(theta_a) of what one sends out meets its neighbour (the form factor of two strips that
     share an edge).
@@ -177,7 +169,7 @@ def test_no_more_light_leaves_than_comes(sigma_deg: float) -> None:
 
 
 def fourth_difference(theta_i: float, theta_r: FloatArray, dphi: float) -> float:
-    """The largest: it goes with the fourth power of the step where the function is smooth."""
+    """The largest: proportional to the fourth power of the step where the function is smooth."""
     geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
     values = EXACT.brdf(geometry, albedo=1.0, sigma_deg=20.0)
     return float(np.max(np.abs(np.diff(values, 4))))
@@ -202,24 +194,19 @@ def test_smooth_in_sigma() -> None:
 
 @pytest.mark.parametrize("sigma_deg", [0.5, 2.0, 20.0, 59.0])
 def test_the_gradient_is_that_of_central_differences(sigma_deg: float) -> None:
-    geometry = scattered(100)
-    slopes = EXACT.gradient(geometry, albedo=0.6, sigma_deg=sigma_deg)
-    step = 1e-3 * sigma_deg
-    for name, values, h in (
-        ("albedo", {"albedo": 0.6, "sigma_deg": sigma_deg}, 1e-3),
-        ("sigma_deg", {"albedo": 0.6, "sigma_deg": sigma_deg}, step),
-    ):
-        up = EXACT.brdf(geometry, **{**values, name: values[name] + h})
-        down = EXACT.brdf(geometry, **{**values, name: values[name] - h})
-        scale = np.max(np.abs(slopes[name]))
-        np.testing.assert_allclose(
-            slopes[name], (up - down) / (2 * h), rtol=1e-5, atol=1e-6 * scale + 1e-7
+    geometry, values = special_directions(100), {"albedo": 0.6, "sigma_deg": sigma_deg}
+    gradient = EXACT.gradient(geometry, **values)
+    for name, step in (("albedo", 1e-3), ("sigma_deg", 1e-3 * sigma_deg)):
+        expected = central_difference(
+            lambda x, name=name: EXACT.brdf(geometry, **{**values, name: x}), values[name], step
         )
+        scale = np.max(np.abs(gradient[name]))
+        np.testing.assert_allclose(gradient[name], expected, rtol=1e-5, atol=1e-6 * scale + 1e-7)
 
 
 @settings(max_examples=20)
 @given(shape=st.sampled_from([(), (1,), (0,), (3,), (2, 3), (1500,)]))
-def test_every_shape_goes_in_and_comes_out(shape: tuple[int, ...]) -> None:
+def test_shapes_are_preserved(shape: tuple[int, ...]) -> None:
     geometry = Geometry.from_degrees(theta_i=np.full(shape, 40.0), theta_r=50.0, dphi=100.0)
     one = Geometry.from_degrees(theta_i=40.0, theta_r=50.0, dphi=100.0)
     value = EXACT.brdf(geometry, albedo=0.5, sigma_deg=25.0)

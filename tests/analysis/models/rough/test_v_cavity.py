@@ -22,25 +22,8 @@ from analysis.models.rough.v_cavity import (
     unidirectional_single_slope,
 )
 from instrument.geometry import FloatArray
+from tests.support.models.v_cavity_reference import GEOMETRIES, half_circle, printed_mean
 
-# theta_i, theta_r, dphi in degrees: in the plane and out of it, at kinks, at and near the corners.
-GEOMETRIES = [
-    (0, 0, 0),
-    (10, 70, 60),
-    (45, 45, 0),
-    (60, 60, 90),
-    (75, 60, 180),
-    (75, 60, 0),
-    (75, 75, 180),
-    (85, 85, 0),
-    (85, 85, 180),
-    (85, 84.9, 179.5),
-    (85, 20, 60),
-    (83, 5, 83),
-    (80.3, 80.3, 179),
-    (70, 70, 150),
-    (85, 0.2, 0.02),
-]
 UP = np.array(0.0)
 
 # Rays in the cross-section of a cavity: x across the groove, z up. The facet with its normal
@@ -48,7 +31,7 @@ UP = np.array(0.0)
 
 
 def reaches(points: FloatArray, towards: FloatArray, theta_a: float, side: int) -> FloatArray:
-    """Whether light gets from points (..., 2) of the facet on that side (-1, 1) out `towards`."""
+    """True if light leaves points (..., 2) of the facet on that side (-1, 1) in `towards`."""
     normal = np.array([-side * math.sin(theta_a), math.cos(theta_a)])
     other = np.array([-side * math.cos(theta_a), math.sin(theta_a)])
     determinant = towards[..., 1] * other[0] - towards[..., 0] * other[1]
@@ -84,7 +67,7 @@ def test_the_attenuation_is_the_part_that_rays_light_and_see() -> None:
         assert factor == pytest.approx(np.mean(lit & seen), abs=1e-4)
 
 
-def test_the_interreflection_factor_is_what_a_monte_carlo_exchange_carries() -> None:
+def test_the_interreflection_factor_is_that_of_a_monte_carlo_exchange() -> None:
     """Photons leave the seen part of a facet by Lambert's law and count where the next is lit."""
     random = np.random.default_rng(2)
     n = 200_000
@@ -126,7 +109,7 @@ def test_open_facets_exchange_pi_times_one_minus_cosine() -> None:
     np.testing.assert_allclose(factor, np.pi * (1 - np.cos(theta_a)), atol=1e-14)
 
 
-def test_one_facet_gives_numbers_at_the_ends_of_the_domain() -> None:
+def test_one_facet_is_finite_at_the_ends_of_the_domain() -> None:
     random = np.random.default_rng(8)
     ends = np.array([0.0, 1e-300, 1e-9, 0.7, np.pi / 2 - 1e-9, np.pi / 2])
     theta_i, theta_r, theta_a = random.choice(ends, (3, 3000))
@@ -142,34 +125,6 @@ def test_one_facet_gives_numbers_at_the_ends_of_the_domain() -> None:
 
 
 # The isotropic single-slope surface
-
-
-def half_circle(theta_i: float, theta_r: float, dphi: float, theta_a: float) -> FloatArray:
-    """Kinks of a cavity's azimuth over half a circle, from (39) and from equal widths."""
-    phi_i, phi_r = (
-        float(critical_angle(np.array(x), np.array(theta_a))) for x in (theta_i, theta_r)
-    )
-    x, y = math.tan(theta_r) * math.cos(dphi), math.tan(theta_r) * math.sin(dphi)
-    equal = [math.atan2(s * math.tan(theta_i) - x, y) for s in (1, -1)]
-    kinks = np.array([-phi_i, phi_i, dphi - phi_r, dphi + phi_r, *equal])
-    kinks = np.sort(np.mod(kinks, np.pi))
-    return np.append(kinks, kinks[0] + np.pi)
-
-
-def printed_mean(theta_i: float, theta_r: float, dphi: float, theta_a: float) -> FloatArray:
-    """(29) by brute force: the printed (28) at 120 nodes a piece, drawn to the ends of the piece.
-
-    tanh(pi/2 sinh s) nodes: they converge whatever the ends' singularities are.
-    """
-    s = np.linspace(-3.2, 3.2, 120)
-    x, w = np.tanh(np.pi / 2 * np.sinh(s)), np.cosh(s) / np.cosh(np.pi / 2 * np.sinh(s)) ** 2
-    w *= np.pi / 2 * (s[1] - s[0])
-    kinks = half_circle(theta_i, theta_r, dphi, theta_a)
-    middle, half = (kinks[1:] + kinks[:-1]) / 2, (kinks[1:] - kinks[:-1]) / 2
-    phi = middle[:, None] + half[:, None] * x
-    towards = Directions(*(np.array(v) for v in (theta_i, 0.0, theta_r, dphi)))
-    parts = unidirectional_single_slope(towards, np.array(theta_a), phi)
-    return np.array([half @ (part @ w) / np.pi for part in parts])
 
 
 def test_the_isotropic_surface_is_the_mean_of_grooves_of_all_azimuths() -> None:
@@ -247,7 +202,7 @@ def test_the_isotropic_surface_is_reciprocal() -> None:
     np.testing.assert_allclose(one.twice, two.twice, rtol=1e-9, atol=1e-11)
 
 
-def test_the_critical_angles_part_the_facets_as_in_table_2() -> None:
+def test_the_critical_angles_divide_the_facets_as_in_table_2() -> None:
     for theta_i, theta_r, theta_a, phi_r, _ in random_cavities(200, 7):
         towards = Directions(*(np.array(x) for x in (theta_i, 0.0, theta_r, phi_r)))
         slope, azimuth = np.array(theta_a), np.linspace(0, 2 * np.pi, 181)

@@ -1,9 +1,8 @@
-"""GGX, EON and Minnaert: formulas typed from their sources, limits, and energy."""
+"""GGX: formulas typed from their sources, limits, and energy."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import mpmath as mp
 import numpy as np
@@ -12,38 +11,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.models import MODELS
-from analysis.models.eon import directional_albedo
 from instrument.geometry import FloatArray, Geometry
+from tests.support.models.geometries import (
+    unit_vectors,
+)
+from tests.support.models.reflectance import hemispherical_reflectance
 
 ANGLE = st.floats(0.0, 89.0)
 AZIMUTH = st.floats(0.0, 360.0)
 PART = st.floats(0.0, 1.0)
+GGX, GGX_F90 = MODELS["ggx"], MODELS["ggx_f90"]
 
 _T, _W = np.polynomial.legendre.leggauss(120)
 THETA, WEIGHT = np.pi / 4 * (_T + 1), np.pi / 4 * _W
 
 
-def reflected(name: str, theta_i: float, azimuths: int = 720, **parameters: float) -> float:
-    """Hemispherical reflectance: Gauss-Legendre in theta, half-step trapezoid in azimuth."""
-    dphi = (np.arange(azimuths) + 0.5) * 180 / azimuths
-    geometry = Geometry.from_degrees(
-        theta_i=theta_i, theta_r=np.degrees(THETA)[:, np.newaxis], dphi=dphi
-    )
-    mean = MODELS[name].brdf(geometry, **parameters).mean(axis=1)
-    return float(2 * np.pi * mean @ (WEIGHT * np.sin(THETA) * np.cos(THETA)))
-
-
-def vectors(i: float, r: float, p: float) -> tuple[FloatArray, FloatArray]:
-    lamp = np.array([math.sin(i), 0, math.cos(i)])
-    return lamp, np.array([math.sin(r) * math.cos(p), math.sin(r) * math.sin(p), math.cos(r)])
-
-
 @given(theta_i=ANGLE, theta_r=ANGLE, dphi=AZIMUTH, f0=PART, alpha=st.floats(0.02, 1.0))
-def test_ggx_by_vectors(
+def test_the_formula_by_vectors(
     theta_i: float, theta_r: float, dphi: float, f0: float, alpha: float
 ) -> None:
     # Walter et al. 2007 (20), (33) for D; Heitz 2014 (72), (99) for Lambda and G2 by height
-    lamp, camera = vectors(*map(math.radians, (theta_i, theta_r, dphi)))
+    lamp, camera = unit_vectors(*map(math.radians, (theta_i, theta_r, dphi)))
     half = (lamp + camera) / np.linalg.norm(lamp + camera)
 
     def Lambda(v: FloatArray) -> float:  # noqa: N802 - the source's symbol
@@ -66,7 +54,7 @@ def test_ggx_by_vectors(
      (45, 45, 180), (89.9, 89.9, 0), (1e-7, 1e-7, 180)],
 )  # fmt: skip
 @pytest.mark.parametrize("alpha", [0.001, 0.1, 1.0])
-def test_ggx_keeps_its_digits_at_grazing_and_for_a_narrow_lobe(
+def test_full_precision_at_grazing_and_for_a_narrow_lobe(
     theta_i: float, theta_r: float, dphi: float, alpha: float
 ) -> None:
     with mp.workdps(50):
@@ -84,7 +72,7 @@ def test_ggx_keeps_its_digits_at_grazing_and_for_a_narrow_lobe(
     assert found == pytest.approx(expected, rel=1e-9)
 
 
-def test_ggx_s_narrow_lobe_is_a_mirror() -> None:
+def test_a_narrow_lobe_is_a_mirror() -> None:
     for theta_i in (0.0, 30.0, 60.0):
         # Integrated over the half-vector: dense about the mirror direction.
         tan = 0.002 * np.tan(np.pi / 2 * (_T + 1) / 2)
@@ -95,7 +83,7 @@ def test_ggx_s_narrow_lobe_is_a_mirror() -> None:
                 [np.sin(np.radians(offset)) * np.cos(azimuth),
                  np.sin(np.radians(offset)) * np.sin(azimuth), np.cos(np.radians(offset))], axis=-1
             )  # fmt: skip
-            lamp, _ = vectors(math.radians(theta_i), 0, 0)
+            lamp, _ = unit_vectors(math.radians(theta_i), 0, 0)
             dot = n @ lamp
             camera = 2 * dot[:, np.newaxis] * n - lamp
             up = (camera[:, 2] > 0) & (dot > 0)
@@ -112,7 +100,7 @@ def test_ggx_s_narrow_lobe_is_a_mirror() -> None:
 
 @pytest.mark.parametrize("alpha", [0.2, 0.6, 1.0])
 @pytest.mark.parametrize("theta_r", [0.0, 40.0, 80.0])
-def test_ggx_s_masking_leaves_the_projected_area(theta_r: float, alpha: float) -> None:
+def test_masking_leaves_the_projected_area(theta_r: float, alpha: float) -> None:
     # Heitz 2014 (14): int G1(v) <v h> D(h) dh = cos(theta_v). With the lamp at the zenith
     # G2 = G1(v), so that 4 f/(F D) = G1(v)/cos_v.
     geometry = Geometry.from_degrees(theta_i=0, theta_r=theta_r)
@@ -130,114 +118,39 @@ def test_ggx_s_masking_leaves_the_projected_area(theta_r: float, alpha: float) -
 
 @pytest.mark.parametrize("alpha", [0.05, 0.3, 1.0])
 @pytest.mark.parametrize("theta_i", [0.0, 45.0, 75.0, 85.0])
-def test_ggx_reflects_less_than_it_receives(theta_i: float, alpha: float) -> None:
-    assert 0.3 < reflected("ggx", theta_i, f0=1.0, alpha=alpha) <= 1.0 + 1e-3
+def test_it_reflects_less_than_it_receives(theta_i: float, alpha: float) -> None:
+    found = hemispherical_reflectance("ggx", theta_i, azimuths=720, f0=1.0, alpha=alpha)
+    assert 0.3 < found <= 1.0 + 1e-3
 
 
-def printed_eon(i: float, r: float, dphi: float, rho: float, rough: float) -> float:
-    """EON typed from the paper: FON with A_F, B_F, the exact albedo E_F, and the lobe f_ms."""
-    mu_i, mu_o = math.cos(i), math.cos(r)
-    s = math.sin(i) * math.sin(r) * math.cos(dphi)
-    s_over_t = s / max(mu_i, mu_o) if s > 0 else s
-    A = 1 / (1 + (1 / 2 - 2 / (3 * math.pi)) * rough)
-
-    def E(mu: float) -> float:  # noqa: N802 - the source's symbol
-        S = math.sqrt(1 - mu * mu)
-        G = S * (math.acos(mu) - S * mu) + 2 / 3 * (S / mu * (1 - S**3) - S)
-        return A + rough * A / math.pi * G
-
-    mean = A * (1 + (2 / 3 - 28 / (15 * math.pi)) * rough)
-    rho_ms = rho**2 * mean / (1 - rho * (1 - mean))
-    single = rho / math.pi * A * (1 + rough * s_over_t)
-    return single + rho_ms / math.pi * (1 - E(mu_i)) * (1 - E(mu_o)) / (1 - mean)
-
-
-@given(theta_i=ANGLE, theta_r=ANGLE, dphi=AZIMUTH, rho=PART, rough=st.floats(0.01, 1.0))
-def test_eon_as_published(
-    theta_i: float, theta_r: float, dphi: float, rho: float, rough: float
-) -> None:
-    geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
-    found = MODELS["eon"].brdf(geometry, albedo=rho, roughness=rough)
-    expected = printed_eon(*map(math.radians, (theta_i, theta_r, dphi)), rho, rough)
-    assert found == pytest.approx(expected, rel=1e-10, abs=1e-13)
-
-
-def halves(function: Callable[[FloatArray], FloatArray], kink: float) -> float:
-    """Integral over theta of 0 to pi/2, with a panel's end at the kink."""
-    total = 0.0
-    for a, b in ((0.0, kink), (kink, np.pi / 2)):
-        theta = a + (b - a) * (_T + 1) / 2
-        total += float((b - a) / 2 * _W @ function(theta))
-    return total
-
-
-@pytest.mark.parametrize("roughness", [0.0, 0.3, 1.0])
-@pytest.mark.parametrize("theta_i", [0.0, 30.0, 60.0, 85.0, 90.0])
-def test_a_white_eon_surface_reflects_all_light(theta_i: float, roughness: float) -> None:
-    # Kinks of s/t: at dphi = 90 degrees (a panel's end) and at theta_r = theta_i.
-    p, wp = np.polynomial.legendre.leggauss(20)
-    dphi = np.concatenate([45 * (p + 1), 90 + 45 * (p + 1)])
-
-    def ring(theta: FloatArray) -> FloatArray:
-        geometry = Geometry.from_degrees(
-            theta_i=theta_i, theta_r=np.degrees(theta)[:, np.newaxis], dphi=dphi
-        )
-        brdf = MODELS["eon"].brdf(geometry, albedo=1.0, roughness=roughness)
-        return np.asarray(np.pi / 2 * (brdf @ np.tile(wp, 2)) * np.sin(theta) * np.cos(theta))
-
-    assert halves(ring, math.radians(theta_i)) == pytest.approx(1, abs=1e-6)
-
-
-def test_eon_s_directional_albedo_is_the_integral_of_its_single_scattering() -> None:
-    # f_ss = f in the limit of a small albedo, per albedo
-    for theta_i in (0.0, 40.0, 80.0):
-        single = reflected("eon", theta_i, albedo=1e-9, roughness=0.8) * 1e9
-        assert directional_albedo(np.radians(theta_i), 0.8) == pytest.approx(single, rel=1e-3)
-    assert directional_albedo(np.array(np.pi / 2), 1.0) == pytest.approx(1, abs=1e-14)
-
-
-@given(theta_i=ANGLE, theta_r=ANGLE, dphi=AZIMUTH, rho=PART)
-def test_eon_without_roughness_is_lambert_s(
-    theta_i: float, theta_r: float, dphi: float, rho: float
-) -> None:
-    geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
-    found = MODELS["eon"].brdf(geometry, albedo=rho, roughness=0.0)
-    assert found == pytest.approx(rho / math.pi, rel=1e-14)
-
-
-@given(theta_i=ANGLE, theta_r=ANGLE, rho=PART, k=st.floats(0.0, 2.0))
-def test_minnaert_as_printed(theta_i: float, theta_r: float, rho: float, k: float) -> None:
-    i, r = math.radians(theta_i), math.radians(theta_r)
-    expected = rho * (k + 1) / (2 * math.pi) * (math.cos(i) * math.cos(r)) ** (k - 1)
-    geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=77)
-    assert MODELS["minnaert"].brdf(geometry, albedo=rho, k=k) == pytest.approx(expected, rel=1e-13)
-
-
-@pytest.mark.parametrize("k", [0.3, 1.0, 1.7])
-@pytest.mark.parametrize("theta_i", [0.0, 50.0, 80.0])
-def test_minnaert_reflects_its_albedo_times_a_power(theta_i: float, k: float) -> None:
-    expected = 0.6 * math.cos(math.radians(theta_i)) ** (k - 1)
-    assert reflected("minnaert", theta_i, 1, albedo=0.6, k=k) == pytest.approx(expected, rel=1e-4)
-
-
-def test_where_minnaert_holds() -> None:
-    model, geometry = MODELS["minnaert"], Geometry.from_degrees(theta_i=0, theta_r=[0, 59, 61, 90])
-    # albedo 0.5, k = 0: as much leaves as comes where cos(theta) = 0.5
-    dark = model.validity(geometry, albedo=0.5, k=0.0)
-    assert list(dark.mask) == [True, True, False, False]
-    assert "oblique" in dark.reason
-    beyond = model.validity(geometry, albedo=0.5, k=1.2)
-    assert not beyond.mask.any()
-    assert "0 to 1" in beyond.reason
-    lambert = model.validity(geometry, albedo=1.0, k=1.0)
-    assert lambert.mask.all()
-    assert lambert.reason == ""
-
-
-@pytest.mark.parametrize("name", ["ggx", "eon"])
-def test_the_lobes_hold_but_where_lamp_and_camera_both_graze(name: str) -> None:
-    model = MODELS[name]
+def test_validity_ends_where_lamp_and_camera_both_graze() -> None:
     geometry = Geometry.from_degrees(theta_i=90, theta_r=[0, 89.9, 90])
+    model = MODELS["ggx"]
     found = model.validity(geometry, **{p.name: p.default for p in model.parameters})
     assert list(found.mask) == [True, True, False]
     assert "graze" in found.reason
+
+
+def test_f90_validity_ends_at_strength_1_and_at_grazing() -> None:
+    geometry = Geometry.from_degrees(theta_i=[30.0, 90.0], theta_r=[30.0, 90.0])
+    assert GGX_F90.validity(geometry, f0=1.0, f90=1.0, alpha=0.3).mask.tolist() == [True, False]
+    strong = GGX_F90.validity(geometry, f0=0.1, f90=2.0, alpha=0.3)
+    assert not strong.mask.any()
+    assert "strength above 1" in strong.reason
+
+
+@given(theta_i=ANGLE, theta_r=ANGLE, dphi=st.floats(0, 360), f0=st.floats(0, 1))
+def test_f90_of_1_is_ggx(theta_i: float, theta_r: float, dphi: float, f0: float) -> None:
+    geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
+    found = GGX_F90.brdf(geometry, f0=f0, f90=1.0, alpha=0.3)
+    assert found == pytest.approx(float(GGX.brdf(geometry, f0=f0, alpha=0.3)), rel=1e-12)
+
+
+def test_f0_and_f90_are_the_strengths_at_the_two_ends() -> None:
+    """theta' = 0 looking along the lamp's ray; theta' near 90 degrees from grazing to grazing."""
+    facing = Geometry.from_degrees(theta_i=20.0, theta_r=20.0, dphi=0.0)
+    across = Geometry.from_degrees(theta_i=89.9999, theta_r=89.9999, dphi=180.0)
+    for geometry, f0, f90 in ((facing, 0.3, 0.0), (across, 0.0, 0.3)):
+        found = GGX_F90.brdf(geometry, f0=f0, f90=f90, alpha=0.4)
+        whole = GGX_F90.brdf(geometry, f0=1.0, f90=1.0, alpha=0.4)
+        assert found / whole == pytest.approx(0.3, rel=1e-4)

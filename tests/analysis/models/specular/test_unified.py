@@ -11,19 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.models import MODELS
-from analysis.models.specular.beckmann_spizzichino import lobe_brdf, rough_lobe_brdf
-from analysis.models.specular.surface_statistics import (
-    curvature_radius,
-    has_gaussian_lobe,
-    has_lobe,
-    has_spike,
-    has_spike_like_lobe,
-    height_over_length,
-    slope_scale,
-    slope_sigma_deg,
-    unshadowed_deg,
-)
-from analysis.models.specular.torrance_sparrow import half_vector
 from analysis.models.specular.unified import (
     lobe_shape,
     mirror_angle,
@@ -32,17 +19,24 @@ from analysis.models.specular.unified import (
     spike_shape,
 )
 from instrument.geometry import FloatArray, Geometry
+from tests.support.models.derivatives import central_difference
+from tests.support.models.geometries import (
+    exchanged,
+    unit_vectors,
+)
 
 MODEL = MODELS["unified"]
+
 ANGLE = st.floats(0.0, 88.0)
+
 AZIMUTH = st.floats(0.0, 360.0)
+
 VALUES = {"diffuse": 0.4, "lobe": 0.3, "sigma_deg": 12.0, "spike": 0.2, "spike_width_deg": 1.5}
 
 
 def printed(i: float, r: float, p: float, v: dict[str, float]) -> float:
-    """The design's formula, by vectors; angles in radians."""
-    lamp = np.array([math.sin(i), 0, math.cos(i)])
-    camera = np.array([math.sin(r) * math.cos(p), math.sin(r) * math.sin(p), math.cos(r)])
+    """The formula by vectors; angles in radians."""
+    lamp, camera = unit_vectors(i, r, p)
     mirror = lamp * [-1, -1, 1]
     half = lamp + camera
     alpha = math.atan2(math.hypot(half[0], half[1]), half[2])
@@ -73,8 +67,7 @@ def test_the_printed_formula_anywhere_reciprocal_and_not_negative(
     assert found >= 0
     expected = printed(*map(math.radians, (theta_i, theta_r, dphi)), VALUES)
     assert found == pytest.approx(expected, rel=1e-9)
-    back = Geometry.from_degrees(theta_i=theta_r, theta_r=theta_i, dphi=dphi)
-    assert MODEL.brdf(back, **VALUES) == pytest.approx(found, rel=1e-11)
+    assert MODEL.brdf(exchanged(geometry), **VALUES) == pytest.approx(found, rel=1e-11)
 
 
 def scan(theta_i: float | FloatArray, theta_r: float | FloatArray) -> Geometry:
@@ -90,7 +83,7 @@ def test_under_a_fixed_lamp_it_is_61() -> None:
     expected = moving_sensor(
         geometry, C_dl, v["lobe"], v["sigma_deg"], v["spike"], v["spike_width_deg"]
     )
-    # The spike's cosines, made symmetric, are off by what they change over its width.
+    # The spike's cosines, made symmetric, are off by their change over its width.
     spike = v["spike"] * spike_shape(geometry, v["spike_width_deg"])
     bound = spike * np.abs(np.sqrt(cos_i / np.cos(geometry.theta_r)) - 1)
     assert np.all(np.abs(found - expected) <= bound + 1e-12 * expected)
@@ -156,8 +149,9 @@ def test_gradient_is_that_of_central_differences(part: float) -> None:
     level = MODEL.brdf(GRID, **values)
     for name, value in values.items():
         h = 1e-4 * value
-        f = [MODEL.brdf(GRID, **{**values, name: value + k * h}) for k in (-2, -1, 1, 2)]
-        expected = (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * h)
+        expected = central_difference(
+            lambda x, name=name: MODEL.brdf(GRID, **{**values, name: x}), value, h
+        )
         assert found[name].shape == GRID.shape
         assert np.all(
             np.abs(found[name] - expected) <= 1e-7 * np.abs(expected) + 1e-9 * level / value
@@ -184,10 +178,10 @@ def test_the_closed_domain_and_both_sides_of_validity() -> None:
         values = {p.name: getattr(p, corner) for p in MODEL.parameters}
         with np.errstate(all="raise"):
             f = MODEL.brdf(geometry, **values)
-            slopes = MODEL.gradient(geometry, **values)
+            gradient = MODEL.gradient(geometry, **values)
         assert np.all(np.isfinite(f) & (f >= 0))
         assert f.dtype == np.float64
-        assert all(np.all(np.isfinite(s)) for s in slopes.values())
+        assert all(np.all(np.isfinite(s)) for s in gradient.values())
     valid = MODEL.validity(geometry, **VALUES)
     grazes = (geometry.theta_i_deg == 90) | (geometry.theta_r_deg == 90)
     np.testing.assert_array_equal(valid.mask, ~grazes)
@@ -198,51 +192,6 @@ def test_the_closed_domain_and_both_sides_of_validity() -> None:
     assert (nearer - 0.4 / math.pi) / (near - 0.4 / math.pi) == pytest.approx(
         10 * shapes[1] / shapes[0], rel=1e-3
     )
-
-
-def test_the_link_of_roughnesses() -> None:
-    # 1991 (60): alpha_0 = atan(0.2) = 11.30993 degrees, over sqrt(2)
-    assert slope_sigma_deg(0.1, 1.0) == pytest.approx(11.30993 / 1.414214, rel=1e-6)
-    assert height_over_length(slope_sigma_deg(0.3, 2.0)) == pytest.approx(0.15, rel=1e-14)
-    assert slope_scale(0.3, 2.0) == pytest.approx(0.3)
-    assert unshadowed_deg(0.5, 1.0) == pytest.approx(45.0)
-    assert unshadowed_deg(0.0, 1.0) == 90.0
-    assert curvature_radius(0.0, 1.0) == math.inf
-    # the second derivative's variance of exp(-tau^2/T^2): 12 sigma_h^2/T^4
-    assert 1 / curvature_radius(0.5, 3.0) == pytest.approx(math.sqrt(12 * 0.25 / 81), rel=1e-14)
-
-
-def test_the_roughnesses_linked_by_60_give_like_lobes() -> None:
-    # Fig. 15: a moving lamp before a fixed camera, sigma_h/T = 0.05; shapes within 1 % of the peak
-    geometry = Geometry.from_degrees(theta_i=np.linspace(0, 60, 61), theta_r=30.0, dphi=180.0)
-    physical = rough_lobe_brdf(geometry, 1.0, 2.0, 40.0)
-    cc = np.cos(geometry.theta_i) * np.cos(geometry.theta_r)
-    theta_a, cos_a, _ = half_vector(geometry)
-    shape = physical * cc * cos_a**4
-    gauss = np.exp(-np.square(theta_a / math.radians(slope_sigma_deg(2.0, 40.0))) / 2)
-    np.testing.assert_allclose(shape / shape[30], gauss, atol=0.01)
-
-
-def test_the_thresholds() -> None:
-    assert [has_lobe(s) for s in (0.0, 0.0249, 0.025, 2.0)] == [False, False, True, True]
-    assert [has_spike(s) for s in (0.0, 1.5, 1.51)] == [True, True, False]
-    assert has_spike_like_lobe(0.19, 10.0)
-    assert not has_spike_like_lobe(0.21, 10.0)
-    assert has_gaussian_lobe(0.49, 10.0)
-    assert not has_gaussian_lobe(0.51, 10.0)
-
-
-def test_wrong_roughness_is_named() -> None:
-    with pytest.raises(ValueError, match="sigma_h = -1 wavelengths; allowed: 0 or more"):
-        has_spike(-1.0)
-    with pytest.raises(ValueError, match="correlation_length = 0 wavelengths; allowed: more than"):
-        slope_sigma_deg(1.0, 0.0)
-    with pytest.raises(ValueError, match=r"sigma_deg = 70 degrees; allowed: 0 to below 63\.6"):
-        height_over_length(70.0)
-    with pytest.raises(ValueError, match="sigma_h = 0 wavelengths; allowed: 1e-100 or more"):
-        rough_lobe_brdf(scan(10.0, 10.0), 1.0, 0.0, 10.0)
-    with pytest.raises(ValueError, match="sigma_h = -1 wavelengths; allowed: 0 or more"):
-        lobe_brdf(scan(10.0, 10.0), 1.0, -1.0, 10.0)
 
 
 @pytest.mark.parametrize("framework", [moving_sensor, moving_source])
