@@ -54,6 +54,10 @@ def test_dphi_0_is_the_side_of_the_lamp_and_180_the_mirror_side() -> None:
         ({"theta_i": -1.0, "theta_r": 0.0}, "theta_i = -1 degrees; allowed: 0 to 90 degrees"),
         ({"theta_i": 0.0, "theta_r": 90.5}, "theta_r = 90.5 degrees; allowed: -90 to 90 degrees"),
         ({"theta_i": 0.0, "theta_r": np.nan}, "theta_r = nan degrees"),
+        ({"theta_i": -1e-9, "theta_r": 0.0}, "theta_i = -1e-09 degrees; allowed: 0 to 90 degrees"),
+        ({"theta_i": [0, 90.0000001], "theta_r": 0.0}, "theta_i = 90.0000001 degrees; allowed: 0"),
+        ({"theta_i": 0.0, "theta_r": [-90.5, 3]}, "theta_r = -90.5 degrees; allowed: -90 to 90"),
+        ({"theta_i": np.nan, "theta_r": 0.0}, "theta_i = nan degrees"),
         ({"theta_i": 0.0, "theta_r": 0.0, "dphi": np.inf}, "dphi = inf degrees; allowed: finite"),
     ],
 )
