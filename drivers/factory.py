@@ -10,7 +10,8 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, assert_never
 
 from drivers.lines.serial_line import Line
-from drivers.stages.motor_stage import Limits, MotorStage
+from drivers.stages.motion import Limits
+from drivers.stages.motor_stage import MotorStage
 from instrument.clock import Clock
 from instrument.closeable import Closing
 from instrument.config.axes import NewportAxis, OrientalAxis, Wired, ZaberAxis

@@ -10,6 +10,7 @@ ends motion, are ever sent twice.
 from __future__ import annotations
 
 import logging
+import math
 import struct
 import termios
 from collections.abc import Callable, Sequence
@@ -35,6 +36,10 @@ TRIES = 3
 GIVE_UP_S = 1.5  # no exchange begins later than this after the first: an error within 2 s
 MAX_LATE_ANSWERS = 2  # earlier answers that may arrive one by one while resynchronising
 SILENCE_S = 0.00175  # between frames, above 19200 baud (Modbus over serial line, 2.5.1.1)
+# ValueError, TypeError, AttributeError: another thread has closed the port meanwhile.
+_CONNECTION_LOST = (
+    ModbusException, OSError, termios.error, ValueError, TypeError, AttributeError,
+)  # fmt: skip
 _SLICE_S = 0.02  # listening for quiet delays a stop by no more than this
 _CHECK_PORT = (
     "look at the cable, at who else has the port open, at the parity, and whether you are in the "
@@ -115,10 +120,7 @@ class ModbusBus(Closing):
             return action()
         except (ModbusIOException, struct.error, IndexError) as error:
             raise self._no_answer(who) from error
-        except (ModbusException, OSError, ValueError, TypeError, AttributeError) as error:
-            # ValueError, TypeError, AttributeError: another thread has closed the port meanwhile
-            raise self._lost(who, str(error)) from error
-        except termios.error as error:
+        except _CONNECTION_LOST as error:
             raise self._lost(who, str(error)) from error
 
     def _close_client(self) -> None:
@@ -174,14 +176,9 @@ class ModbusUnit:
     def read(self, register: int, count: int, until_s: float | None = None) -> list[int]:
         """Return `count` registers from `register` on; up to three tries, none after `until_s`."""
         until = self.deadline_s() if until_s is None else until_s
-        for tries_left in reversed(range(TRIES)):
-            try:
-                return self._in_step(lambda: self._read(register, count), until)
-            except AnswerLost as lost:
-                if not tries_left or self._bus.clock.now_s() > until:
-                    raise
-                log.warning("%s", lost)
-        raise NoReply(f"{self._who}: not asked")  # TRIES is not 0
+        return self._retried(
+            lambda: self._in_step(lambda: self._read(register, count), until), until
+        )
 
     def write(
         self,
@@ -213,15 +210,12 @@ class ModbusUnit:
 
         It is sent up to three times, until it is acknowledged: only for what is safe to repeat.
         """
-        for tries_left in reversed(range(TRIES)):
-            try:
-                with self._bus.lock.hold(urgent=True):
-                    return self._write_one(register, value)
-            except AnswerLost as lost:
-                if not tries_left:
-                    raise
-                log.warning("%s", lost)
-        return None
+
+        def send() -> None:
+            with self._bus.lock.hold(urgent=True):
+                self._write_one(register, value)
+
+        self._retried(send)
 
     def _in_step(self, action: Callable[[], T], until_s: float) -> T:
         """Resynchronise if necessary, then act; the lock is released after every step."""
@@ -267,6 +261,17 @@ class ModbusUnit:
         )
         if (reply.address, reply.registers) != (register, [value]):
             raise self._garbled(f"register {reply.address:04X} hex, {reply.registers}")
+
+    def _retried(self, action: Callable[[], T], until_s: float = math.inf) -> T:
+        """Return the result of up to three tries, none of them begun after `until_s`."""
+        for tries_left in reversed(range(TRIES)):
+            try:
+                return action()
+            except AnswerLost as lost:
+                if not tries_left or self._bus.clock.now_s() > until_s:
+                    raise
+                log.warning("%s", lost)
+        raise NoReply(f"{self._who}: not asked")  # TRIES is not 0
 
     def _exchange(
         self, register: int, function: int, action: Callable[[Client], ModbusPDU]

@@ -1,25 +1,23 @@
 """Common base of all motor stages: limits before a byte is sent, homing first, checked positions.
 
-A driver provides the exchanges with its controller. The rules that tell when a move has begun and
-ended, what counts as a stall, and when a stop is sent are here.
+A driver provides the exchanges with its controller; the order of a move, the refusals and the stop
+are here. `drivers.stages.motion` tells when a motion has begun and ended, and what is a stall.
 """
 
 from __future__ import annotations
 
 import logging
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 
+from drivers.stages.motion import STALLED_S, HomingMonitor, Limits, MoveMonitor, Status
 from drivers.stages.watchdog import SILENT_S, Watchdog
 from instrument.clock import Clock
+from instrument.closeable import Closing
 from instrument.errors import DeviceError
-from instrument.kinematics import Trapezoid
 
 log = logging.getLogger(__name__)
 
 POLL_S = 0.005
-STARTS_WITHIN_S = 0.5  # some controllers still report ready just after the command
-STALLED_S = 1.0  # reported as moving, but at the same position
 _ROUNDING_DEG = 1e-9
 _NO_STATUS = f"no status for {SILENT_S:g} s while it moved, so it was told to stop"
 
@@ -28,41 +26,19 @@ class Stopped(DeviceError):
     """The motion was stopped before it reached its end."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
-    """Limits of a stage from the rig file, in the device's own degrees.
-
-    A move may end up to `tolerance_deg` from its target. Homing may take up to `homing_s` and ends
-    at `home_deg`.
-    """
-
-    min_deg: float
-    max_deg: float
-    speed_deg_per_s: float
-    acceleration_deg_per_s2: float
-    tolerance_deg: float
-    homing_s: float
-    home_deg: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Status:
-    """Status reported by a controller; `fault` is empty or says what to look at."""
-
-    position_deg: float
-    moving: bool
-    homed: bool
-    fault: str = ""
-
-
 class MotorStage(ABC):
-    """A stage behind a controller. Angles are the device's own degrees."""
+    """A stage behind a controller. Angles are the device's own degrees.
+
+    `line` is closed with the stage; None for a line that others share.
+    """
 
     KEEPS_REFERENCE = False
     """True for controllers that refuse to search for a reference that they have."""
 
-    def __init__(self, name: str, limits: Limits, clock: Clock) -> None:
-        self.name, self._limits, self._clock = name, limits, clock
+    def __init__(
+        self, name: str, limits: Limits, clock: Clock, line: Closing | None = None
+    ) -> None:
+        self.name, self._limits, self._clock, self._line = name, limits, clock, line
         self._target_deg: float | None = None
         self._from_deg = 0.0
         self._started_s = 0.0
@@ -78,10 +54,6 @@ class MotorStage(ABC):
     @abstractmethod
     def status(self, retry: bool = True) -> Status:
         """Read position and state; without `retry` no question is repeated."""
-
-    @abstractmethod
-    def close(self) -> None:
-        """Release the line; safe to call twice."""
 
     @abstractmethod
     def _own_limits_deg(self) -> tuple[float, float]:
@@ -183,7 +155,7 @@ class MotorStage(ABC):
     def _monitor_homing(self, again: bool) -> None:
         self._send_home()
         self._repeat_stop()
-        monitor = _HomingMonitor(self._limits.homing_s, self._clock.now_s(), again)
+        monitor = HomingMonitor(self._limits.homing_s, self._clock.now_s(), again)
         while not monitor.ended(now := self._poll()):
             if monitor.should_resend(self._clock.now_s()):
                 log.warning("%s: stands still: homing command sent again", self.name)
@@ -230,7 +202,7 @@ class MotorStage(ABC):
             self.watchdog.end()
 
     def _monitor_move(self, target_deg: float) -> float:
-        monitor = _MoveMonitor(self._limits, self._from_deg, target_deg, self._started_s)
+        monitor = MoveMonitor(self._limits, self._from_deg, target_deg, self._started_s)
         while not monitor.ended(now := self._poll()):
             self._refuse_lost_reference(now)
             time_s = self._clock.now_s()
@@ -245,6 +217,12 @@ class MotorStage(ABC):
                 raise DeviceError(f"{self.name}: {problem}")
             self._clock.sleep(POLL_S)
         return self._check_arrival(now)
+
+    def close(self) -> None:
+        """Release the line; safe to call twice."""
+        self.watchdog.end()
+        if self._line is not None:
+            self._line.close()
 
     def stop(self) -> None:
         """End all motion now; safe at any time, repeatedly, and from any thread."""
@@ -315,79 +293,3 @@ class MotorStage(ABC):
         if now.fault:
             self._target_deg = None
             raise DeviceError(f"{self.name}: {now.fault}")
-
-
-class _HomingMonitor:
-    """Checks that homing begins and ends in time; `again`: the reference was known before."""
-
-    def __init__(self, allowed_s: float, started_s: float, again: bool) -> None:
-        self._allowed_s, self._started_s, self._known = allowed_s, started_s, again
-        self._moved = self._resent = False
-
-    def ended(self, now: Status) -> bool:
-        """True once the reference is known and the stage stands."""
-        self._moved |= now.moving
-        self._known &= now.homed and not now.moving
-        return now.homed and not now.moving and not self._known
-
-    def should_resend(self, time_s: float) -> bool:
-        """True once, if the stage should be moving by now and is not."""
-        late = not self._moved and not self._resent and time_s - self._started_s > STARTS_WITHIN_S
-        self._resent |= late
-        return late
-
-    def problem(self, time_s: float) -> str:
-        """Return a description of what is wrong, or an empty text."""
-        since_s = time_s - self._started_s
-        if not self._moved and since_s > 2 * STARTS_WITHIN_S:
-            return "did not begin to look for its reference: look at its motor's supply"
-        if since_s > self._allowed_s:
-            return (
-                f"its reference was not found within {self._allowed_s:g} s: look at the reference "
-                "switch, and whether something holds the stage"
-            )
-        return ""
-
-
-class _MoveMonitor:
-    """Checks that a move begins, makes progress, and ends in time."""
-
-    def __init__(self, limits: Limits, start: float, target: float, started_s: float) -> None:
-        self._limits, self._target, self._started_s = limits, target, started_s
-        way = Trapezoid(target - start, limits.speed_deg_per_s, limits.acceleration_deg_per_s2)
-        self._allowed_s = 1.5 * way.duration_s + 2.0
-        self._start = self._at = start
-        self._at_s = started_s
-        self._begun = self._resent = False
-
-    def ended(self, now: Status) -> bool:
-        """True once the stage stands, unless the move has not begun yet."""
-        self._begun |= now.moving or abs(now.position_deg - self._start) > self._step_deg
-        return not now.moving and (self._begun or self._at_target(now))
-
-    def should_resend(self, time_s: float) -> bool:
-        """True once, if the stage should be moving by now and has not moved."""
-        late = not self._begun and not self._resent and time_s - self._started_s > STARTS_WITHIN_S
-        self._resent |= late
-        return late
-
-    def problem(self, now: Status, time_s: float) -> str:
-        """Return a description of what is wrong with the move, or an empty text."""
-        if abs(now.position_deg - self._at) > self._step_deg:
-            self._at, self._at_s = now.position_deg, time_s
-        since_s = time_s - self._started_s
-        where = f"at {now.position_deg:g} deg on the way to {self._target:g} deg"
-        if now.moving and time_s - self._at_s > STALLED_S:
-            return f"stalled {where}: look for what holds the stage, then home it"
-        if not self._begun and since_s > 2 * STARTS_WITHIN_S:
-            return f"did not begin to move, {where}: look at its motor's supply"
-        if since_s > self._allowed_s:
-            return f"still {where} after {since_s:.1f} s (allowed: {self._allowed_s:.1f} s)"
-        return ""
-
-    @property
-    def _step_deg(self) -> float:
-        return self._limits.tolerance_deg / 10
-
-    def _at_target(self, now: Status) -> bool:
-        return abs(now.position_deg - self._target) <= self._limits.tolerance_deg

@@ -8,7 +8,8 @@ from typing import TypeVar
 
 from drivers.lines.serial_line import Garbled, Line, NoReply
 from drivers.stages import newport_framing as framing
-from drivers.stages.motor_stage import Limits, MotorStage, Status
+from drivers.stages.motion import Limits, Status
+from drivers.stages.motor_stage import MotorStage
 from instrument.clock import Clock
 from instrument.errors import DeviceError
 
@@ -30,13 +31,8 @@ class NewportPort:
 
     def __init__(self, line: Line, address: int, who: str) -> None:
         self.line, self.address, self.who = line, address, who
-        self._version = ""
-        self._version = self.query("VE", str)
-
-    @property
-    def version(self) -> str:
-        """Version text of the controller."""
-        return self._version
+        self.version = ""
+        self.version = self.query("VE", str)
 
     def query(
         self, letters: str, parse: Callable[[str], T], value: str = "", tries: int = _TRIES
@@ -94,13 +90,13 @@ class NewportPort:
         if not self.line.reply_pending:
             return
         self.line.drain(_QUIET_S)
-        if not self._version:  # while opening there is nothing yet to compare with
+        if not self.version:  # while opening there is nothing yet to compare with
             self.line.reply_pending = False
             return
         version = self._exchange("VE")
-        if version != self._version:
+        if version != self.version:
             self.line.reply_pending = True
-            raise Garbled(f"{self.who}: calls itself {version!r} now, and {self._version!r} before")
+            raise Garbled(f"{self.who}: calls itself {version!r} now, and {self.version!r} before")
 
 
 class NewportStage(MotorStage):
@@ -111,7 +107,7 @@ class NewportStage(MotorStage):
     def __init__(
         self, name: str, line: Line, address: int, model: str, limits: Limits, clock: Clock
     ) -> None:
-        super().__init__(name, limits, clock)
+        super().__init__(name, limits, clock, line)
         self._who = f"{name} (Newport {model}, address {address} on {line.port})"
         self._port = NewportPort(line, address, self._who)
         if model not in self._port.version:
@@ -132,11 +128,6 @@ class NewportStage(MotorStage):
         state = self._port.query("TS", lambda text: framing.state(self._who, text), tries=tries)
         position = self._port.query("TP", self._number("TP"), tries=tries)
         return Status(position, state.moving, state.homed, state.fault)
-
-    def close(self) -> None:
-        """Close the line; safe to call twice."""
-        self.watchdog.end()
-        self._port.line.close()
 
     def _number(self, letters: str) -> Callable[[str], float]:
         return lambda text: framing.number(self._who, letters, text)

@@ -47,22 +47,14 @@ FAULTS = {
     0x0001: "negative end of run reached: move it back by hand, then home it",
 }
 
-_NOT_REFERENCED = range(0x0A, 0x12)
-_CONFIGURATION = range(0x14, 0x15)
-_HOMING = range(0x1E, 0x20)
-_MOVING = range(0x28, 0x29)
-_READY = range(0x32, 0x39)  # 36 to 38: CONEX only
-_DISABLED = range(0x3C, 0x40)  # 3F: CONEX only
-_JOGGING = range(0x46, 0x48)  # TRACKING of a CONEX
-
 _STATES = {
-    "not referenced": _NOT_REFERENCED,
-    "configuration": _CONFIGURATION,
-    "homing": _HOMING,
-    "moving": _MOVING,
-    "ready": _READY,
-    "disabled": _DISABLED,
-    "jogging": _JOGGING,
+    "not referenced": range(0x0A, 0x12),
+    "configuration": range(0x14, 0x15),
+    "homing": range(0x1E, 0x20),
+    "moving": range(0x28, 0x29),
+    "ready": range(0x32, 0x39),  # 36 to 38: CONEX only
+    "disabled": range(0x3C, 0x40),  # 3F: CONEX only
+    "jogging": range(0x46, 0x48),  # TRACKING of a CONEX
 }
 
 

@@ -15,7 +15,8 @@ from drivers.lines.modbus_bus import AnswerLost, ModbusBus, ModbusUnit
 from drivers.lines.modbus_client import BusSettings
 from drivers.lines.serial_line import REPLY_S
 from drivers.stages import oriental_framing as framing
-from drivers.stages.motor_stage import POLL_S, STARTS_WITHIN_S, Limits, MotorStage, Status, Stopped
+from drivers.stages.motion import STARTS_WITHIN_S, Limits, Status
+from drivers.stages.motor_stage import POLL_S, MotorStage, Stopped
 from instrument.clock import Clock
 from instrument.errors import DeviceError, InputError
 
@@ -69,13 +70,10 @@ class OrientalStage(MotorStage):
     def __init__(
         self, name: str, settings: OrientalSettings, clock: Clock, bus: ModbusBus | None = None
     ) -> None:
-        super().__init__(name, settings.limits, clock)
+        line = bus or ModbusBus(name, settings.bus, clock)
+        super().__init__(name, settings.limits, clock, None if bus else line)
         self._settings = settings
-        self._bus = bus or ModbusBus(name, settings.bus, clock)
-        self._owns_bus = bus is None
-        self._drive = ModbusUnit(
-            self._bus, name, settings.unit, framing.DIRECT_DATA, _RESYNC_COUNTS
-        )
+        self._drive = ModbusUnit(line, name, settings.unit, framing.DIRECT_DATA, _RESYNC_COUNTS)
         self._stops, self._cleared = 0, -1  # stops sent; how many of them are cleared in 007D
         try:
             self.opening_report, self._target_steps = self._identify()
@@ -97,12 +95,6 @@ class OrientalStage(MotorStage):
             homed=output.has(framing.HOME_END),
             fault=output.fault,
         )
-
-    def close(self) -> None:
-        """Close the line unless it is shared; safe to call twice."""
-        self.watchdog.end()
-        if self._owns_bus:
-            self._bus.close()
 
     def _own_limits_deg(self) -> tuple[float, float]:
         """Return infinite limits: the registers of an AZ drive's software limits are not known."""

@@ -6,7 +6,8 @@ import logging
 
 from drivers.lines.serial_line import Garbled, Line, NoReply, number_of
 from drivers.stages import zaber_framing as framing
-from drivers.stages.motor_stage import Limits, MotorStage, Status
+from drivers.stages.motion import Limits, Status
+from drivers.stages.motor_stage import MotorStage
 from drivers.stages.zaber_framing import Reply
 from instrument.clock import Clock
 from instrument.errors import DeviceError
@@ -80,7 +81,7 @@ class ZaberStage(MotorStage):
         limits: Limits,
         clock: Clock,
     ) -> None:
-        super().__init__(name, limits, clock)
+        super().__init__(name, limits, clock, line)
         self._who = f"{name} (Zaber, device {device} axis {axis} on {line.port})"
         self._port = ZaberPort(line, device, axis, self._who)
         self._steps_per_deg = microsteps_per_deg
@@ -111,11 +112,6 @@ class ZaberStage(MotorStage):
         if reply.warning != framing.NO_WARNING:
             flags = self._port.query("warnings", tries=tries).data.split()[1:]
         return Status(position, reply.busy, framing.homed(flags), framing.fault(flags))
-
-    def close(self) -> None:
-        """Close the line; safe to call twice."""
-        self.watchdog.end()
-        self._port.line.close()
 
     def _angle(self, setting: str) -> float:
         return self._value(self._port.query(f"get {setting}"), setting) / self._steps_per_deg

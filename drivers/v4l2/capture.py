@@ -139,12 +139,9 @@ class Capture:
         shows_state = not all(arrival.fault == _NO_STATE for arrival in arrivals)
         stated_s = ioctl.frame_period_s(self._control) or 0.0
         measured_s = float(np.min(periods)) if monotonic else 0.0
-        return Traits(
-            period_s=max(stated_s, measured_s),
-            monotonic=monotonic,
-            reports_torn_frames=self.can_query_buffers and shows_state,
-            notes=tuple(self._notes),
-        )
+        reports_torn_frames = self.can_query_buffers and shows_state
+        period_s = max(stated_s, measured_s)
+        return Traits(period_s, monotonic, reports_torn_frames, tuple(self._notes))
 
     def next(self, heartbeat: Heartbeat, patience_s: float) -> Arrival:
         """Take the next frame out of the queue, old or new; raise if the camera is silent."""

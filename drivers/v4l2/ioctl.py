@@ -120,7 +120,7 @@ class Format:
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """A control with its range and its value; the value is None if it cannot be read."""
+    """A control, its range as in the structure, and its value; None if it cannot be read."""
 
     number: int
     name: str
@@ -214,16 +214,9 @@ def control(descriptor: int, number: int) -> Control | None:
     found, kind, name, minimum, maximum, step, default, flags = QUERYCTRL_STRUCT.unpack(answer)
     if flags & _DISABLED:
         return None
-    return Control(
-        number=found,
-        name=text(name),
-        kind=KINDS.get(kind, str(kind)),
-        minimum=minimum,
-        maximum=maximum,
-        step=step,
-        default=default,
-        value=None if kind in _WITHOUT_VALUE else _value_or_none(descriptor, found),
-    )
+    value = None if kind in _WITHOUT_VALUE else _value_or_none(descriptor, found)
+    label = KINDS.get(kind, str(kind))
+    return Control(found, text(name), label, minimum, maximum, step, default, value)
 
 
 def _value_or_none(descriptor: int, number: int) -> int | None:

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from drivers.lines.priority_lock import PriorityLock
 from drivers.lines.serial_line import Garbled, Line, PortGone
 from drivers.stages import newport_framing, zaber_framing
-from drivers.stages.motor_stage import MotorStage, Status, Stopped
+from drivers.stages.motion import Status
+from drivers.stages.motor_stage import MotorStage, Stopped
 from drivers.stages.newport import NewportStage
 from drivers.stages.zaber import ZaberStage
 from instrument.clock import SystemClock

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
-from drivers.stages.motor_stage import Limits
+from drivers.stages.motion import Limits
 from drivers.stages.oriental import OrientalSettings, OrientalStage
 from instrument.clock import SystemClock
 from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from drivers.stages.motor_stage import Limits
+from drivers.stages.motion import Limits
 from instrument.clock import SystemClock
 from instrument.devices import Stage
 from sim.emulated.motor import Mechanics, Motor

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.lines.serial_line import Line
-from drivers.stages.motor_stage import Limits, MotorStage
+from drivers.stages.motion import Limits
+from drivers.stages.motor_stage import MotorStage
 from drivers.stages.newport import NewportStage
 from drivers.stages.oriental import OrientalSettings, OrientalStage
 from drivers.stages.zaber import ZaberStage

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from drivers.stages.motor_stage import Limits, MotorStage
+from drivers.stages.motion import Limits
+from drivers.stages.motor_stage import MotorStage
 from drivers.stages.watchdog import Watchdog
 from sim.clock import SimulatedClock
 from sim.emulated.motor import Mechanics, Motor

@@ -1,0 +1,115 @@
+"""Limits and status of a stage, and monitors that check the beginning and end of a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from instrument.kinematics import Trapezoid
+
+STARTS_WITHIN_S = 0.5  # some controllers still report ready just after the command
+STALLED_S = 1.0  # reported as moving, but at the same position
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Limits of a stage from the rig file, in the device's own degrees.
+
+    A move may end up to `tolerance_deg` from its target. Homing may take up to `homing_s` and ends
+    at `home_deg`.
+    """
+
+    min_deg: float
+    max_deg: float
+    speed_deg_per_s: float
+    acceleration_deg_per_s2: float
+    tolerance_deg: float
+    homing_s: float
+    home_deg: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """Status reported by a controller; `fault` is empty or says what to look at."""
+
+    position_deg: float
+    moving: bool
+    homed: bool
+    fault: str = ""
+
+
+class _Monitor:
+    """Checks that a motion begins, or that its command is sent again."""
+
+    def __init__(self, started_s: float) -> None:
+        self._started_s = started_s
+        self._begun = self._resent = False
+
+    def should_resend(self, time_s: float) -> bool:
+        """True once, if the stage should be moving by now and is not."""
+        late = not self._begun and not self._resent and time_s - self._started_s > STARTS_WITHIN_S
+        self._resent |= late
+        return late
+
+
+class HomingMonitor(_Monitor):
+    """Checks that homing begins and ends in time; `again`: the reference was known before."""
+
+    def __init__(self, allowed_s: float, started_s: float, again: bool) -> None:
+        super().__init__(started_s)
+        self._allowed_s, self._known = allowed_s, again
+
+    def ended(self, now: Status) -> bool:
+        """True once the reference is known and the stage stands."""
+        self._begun |= now.moving
+        self._known &= now.homed and not now.moving
+        return now.homed and not now.moving and not self._known
+
+    def problem(self, time_s: float) -> str:
+        """Return a description of what is wrong, or an empty text."""
+        since_s = time_s - self._started_s
+        if not self._begun and since_s > 2 * STARTS_WITHIN_S:
+            return "did not begin to look for its reference: look at its motor's supply"
+        if since_s > self._allowed_s:
+            return (
+                f"its reference was not found within {self._allowed_s:g} s: look at the reference "
+                "switch, and whether something holds the stage"
+            )
+        return ""
+
+
+class MoveMonitor(_Monitor):
+    """Checks that a move begins, makes progress, and ends in time."""
+
+    def __init__(self, limits: Limits, start: float, target: float, started_s: float) -> None:
+        super().__init__(started_s)
+        self._limits, self._target = limits, target
+        way = Trapezoid(target - start, limits.speed_deg_per_s, limits.acceleration_deg_per_s2)
+        self._allowed_s = 1.5 * way.duration_s + 2.0
+        self._start = self._at = start
+        self._at_s = started_s
+
+    def ended(self, now: Status) -> bool:
+        """True once the stage stands, unless the move has not begun yet."""
+        self._begun |= now.moving or abs(now.position_deg - self._start) > self._step_deg
+        return not now.moving and (self._begun or self._at_target(now))
+
+    def problem(self, now: Status, time_s: float) -> str:
+        """Return a description of what is wrong with the move, or an empty text."""
+        if abs(now.position_deg - self._at) > self._step_deg:
+            self._at, self._at_s = now.position_deg, time_s
+        since_s = time_s - self._started_s
+        where = f"at {now.position_deg:g} deg on the way to {self._target:g} deg"
+        if now.moving and time_s - self._at_s > STALLED_S:
+            return f"stalled {where}: look for what holds the stage, then home it"
+        if not self._begun and since_s > 2 * STARTS_WITHIN_S:
+            return f"did not begin to move, {where}: look at its motor's supply"
+        if since_s > self._allowed_s:
+            return f"still {where} after {since_s:.1f} s (allowed: {self._allowed_s:.1f} s)"
+        return ""
+
+    @property
+    def _step_deg(self) -> float:
+        return self._limits.tolerance_deg / 10
+
+    def _at_target(self, now: Status) -> bool:
+        return abs(now.position_deg - self._target) <= self._limits.tolerance_deg
