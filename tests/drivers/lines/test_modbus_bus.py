@@ -1,10 +1,10 @@
-"""Every fault of a line at every step of a move: the right value or a named error, one trigger."""
+"""Modbus line: every fault at every step gives the right value or a named error, and one move."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TypeVar
 
@@ -18,15 +18,17 @@ from drivers.stages.oriental import OrientalStage
 from drivers.stages.oriental_framing import value_of
 from instrument.clock import SystemClock
 from instrument.errors import DeviceError
-from sim.emulated.wire import Fault
+from sim.emulated.wire import Fault, PtyWire
 from tests.support.stages.emulated_az_drive import (
     SLOW,
     SLOW_LIMITS,
     STEPS_PER_DEG,
     WIRES,
     EmulatedDrive,
+    az_settings,
     emulated_drive,
 )
+from tests.support.stages.waiting import wait_until
 
 pytestmark = pytest.mark.waits
 
@@ -52,6 +54,12 @@ def _moved(at: EmulatedDrive, stage: OrientalStage) -> float:
     return stage.wait()
 
 
+@pytest.fixture(params=WIRES)
+def at(request: pytest.FixtureRequest) -> Iterator[EmulatedDrive]:
+    with emulated_drive(request.param, reply_s=0.1) as made:
+        yield made
+
+
 @pytest.mark.parametrize(("kind", "after"), [("pty", 0), ("tcp", 2)])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_opening(kind: str, fault: str, after: int) -> None:
@@ -68,7 +76,7 @@ def test_reading_the_status(kind: str, fault: str, after: int) -> None:
     with emulated_drive(kind, reply_s=REPLY_S) as at:
         stage = at.homed()
         at.motor.move(TARGET)
-        _until(lambda: not at.motor.moving)
+        wait_until(lambda: not at.motor.moving)
         at.wire.inject(*[None] * after, FAULTS[fault])
         for _ in range(3):
             assert _outcome(fault, stage.position_deg) in (TARGET, None)
@@ -83,7 +91,7 @@ def test_writing_a_move(kind: str, fault: str, again: bool) -> None:
         if again:  # the drive holds the same target already, and stands elsewhere
             assert _moved(at, stage) == TARGET
             at.motor.move(0.0)
-            _until(lambda: not at.motor.moving)
+            wait_until(lambda: not at.motor.moving)
             moves = 2
         since = len(at.wire.seen)
         at.wire.inject(None, None, None, FAULTS[fault])  # after status, position and READY
@@ -153,7 +161,7 @@ def test_two_faults_in_a_row_at_a_move(kind: str, first: str, second: str) -> No
         assert at.drive.triggers == 1
 
 
-def test_a_line_that_dies_at_a_move_says_that_it_may_move() -> None:
+def test_after_a_line_dies_during_a_move_command_the_error_warns_of_motion() -> None:
     with emulated_drive("pty") as at:
         stage = at.homed()
         at.wire.inject(None, None, None, *[Fault("drop")] * 9)
@@ -177,7 +185,7 @@ def test_a_stop_forbids_the_second_try_of_a_lost_move() -> None:
 
         moving = threading.Thread(target=move)
         moving.start()
-        _until(lambda: len(at.sent(b"\x10\x00\x58", since)) == 1)
+        wait_until(lambda: len(at.sent(b"\x10\x00\x58", since)) == 1)
         stage.stop()
         moving.join(timeout=5)
         assert told == ["stopped"]
@@ -185,8 +193,8 @@ def test_a_stop_forbids_the_second_try_of_a_lost_move() -> None:
 
 
 @pytest.mark.parametrize("late", [1.5, 2.4, 4.0])
-def test_a_late_answer_is_never_taken_for_anothers(late: float) -> None:
-    """Command and feedback position are alike in shape: only waiting tells their answers apart."""
+def test_a_late_answer_is_never_taken_for_another(late: float) -> None:
+    """Command and feedback position have the same form; only waiting separates their answers."""
     with emulated_drive("pty", SLOW, SLOW_LIMITS) as at:
         stage = at.homed()
         stage.start_move(90.0)
@@ -203,8 +211,40 @@ def test_a_late_answer_is_never_taken_for_anothers(late: float) -> None:
                 assert value_of(unit.read(0xCC, 2)) == held
 
 
+@pytest.mark.parametrize(
+    ("port", "says"),
+    [("/dev/none", "cannot open /dev/none"), ("tcp://localhost:1", "cannot open tcp://localhost")],
+)
+def test_a_missing_port_is_named(port: str, says: str) -> None:
+    with pytest.raises(PortGone, match=says):
+        OrientalStage("theta_r", az_settings(port, parity="E"), SystemClock())
+
+
+def test_a_parity_that_the_port_refuses_is_named() -> None:
+    with PtyWire([]) as wire, pytest.raises(PortGone, match=r"'X': look at .*, at the parity"):
+        OrientalStage("theta_r", az_settings(wire.port, parity="X"), SystemClock())
+
+
+def test_a_closed_line_stays_closed(at: EmulatedDrive) -> None:
+    stage = at.homed()
+    stage.close()
+    stage.close()
+    for action in (stage.status, stage.stop):
+        with pytest.raises(PortGone, match="it was closed"):
+            action()
+
+
+def test_a_gateway_that_has_hung_up_is_reconnected() -> None:
+    with emulated_drive("tcp") as at:
+        stage = at.homed()
+        peer = at.wire._peer  # type: ignore[union-attr]  # a TcpWire's
+        assert peer is not None
+        peer.shutdown(2)
+        assert stage.position_deg() == 0.0
+
+
 def _outcome(fault: str, action: Callable[[], T]) -> T | None:
-    """What came of it within 2 s; None stands for a named error, which only an unplug may be."""
+    """Result of an action within 2 s; None for a named error, allowed only after an unplug."""
     begun_s = time.monotonic()
     if fault == "unplug":
         value = None
@@ -214,10 +254,3 @@ def _outcome(fault: str, action: Callable[[], T]) -> T | None:
         value = action()
     assert time.monotonic() - begun_s < 2.0
     return value
-
-
-def _until(true: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + 5
-    while not true():
-        assert time.monotonic() < deadline_s
-        time.sleep(0.001)

@@ -1,17 +1,20 @@
-"""What goes wrong on a line: recovery with the right value, or an error that names the stage.
+"""Faults of a serial line: recovery with the right value, or an error that names the stage.
 
-Never a wrong number, never a move made twice. One test for each fault, moment and device; the
-outcomes that are expected stand in one table.
+Never a wrong number, never a move made twice. Each fault is tested at each moment and with each
+device; tables give the expected outcomes.
 """
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
-from drivers.lines.serial_line import Garbled, NoReply, PortGone
+from drivers.lines.serial_line import Garbled, Line, NoReply, PortGone
+from instrument.clock import SystemClock
 from instrument.errors import DeviceError
 from sim.emulated.wire import Fault
 from tests.support.stages.emulated_stages import EMULATED_STAGES, MECHANICS, SLOW, EmulatedStage
@@ -20,7 +23,7 @@ pytestmark = pytest.mark.waits
 
 BOUND_S = 3.0
 
-# One answer spoilt, then all is well: the stage must get over it, whatever it was doing.
+# One spoilt answer, then none: the stage must recover, whatever it was doing.
 ONCE = {
     "drop": Fault("drop"),
     "delay": Fault("delay", 0.1),
@@ -30,7 +33,7 @@ ONCE = {
     "nul": Fault("nul"),
     "lose request": Fault("lose request"),
 }
-# It stays so: the error that says it.
+# Permanent faults, and the errors that report them.
 FOR_GOOD = {
     "drop": (Fault("drop"), NoReply),
     "late": (Fault("late", 0.3), (NoReply, Garbled)),
@@ -41,7 +44,7 @@ FOR_GOOD = {
 }
 
 
-# How the AZ's faults look through a gateway is in `test_oriental_faults`.
+# Faults of an AZ drive behind a gateway are tested in `test_modbus_bus`.
 SERIAL = [name for name in EMULATED_STAGES if name != "oriental tcp"]
 
 
@@ -78,10 +81,10 @@ ACTIONS: dict[str, tuple[Callable[[EmulatedStage], float], float]] = {
 @pytest.mark.parametrize("answer", [0, 1, 3])
 @pytest.mark.parametrize("fault", ONCE)
 @pytest.mark.parametrize("action", ACTIONS)
-def test_one_spoilt_answer_is_got_over(
+def test_one_spoilt_answer_is_recovered_from(
     bench: EmulatedStage, action: str, fault: str, answer: int
 ) -> None:
-    """Whichever answer it is: to the status, to the command, to what asks after it."""
+    """The spoilt answer may be that to the status, to the command, or to the query after it."""
     act, expected = ACTIONS[action]
     moves = bench.moves()
     bench.wire.inject(*[None] * answer, ONCE[fault])
@@ -94,7 +97,7 @@ def test_one_spoilt_answer_is_got_over(
 
 @pytest.mark.parametrize("fault", FOR_GOOD)
 @pytest.mark.parametrize("action", ACTIONS)
-def test_a_line_that_stays_bad_is_named_in_time(
+def test_a_line_that_stays_bad_is_an_error_in_time(
     bench: EmulatedStage, action: str, fault: str
 ) -> None:
     act, _ = ACTIONS[action]
@@ -121,7 +124,7 @@ def test_a_line_that_goes_bad_during_a_move_ends_it_in_time(
     assert time.monotonic() - begun_s < BOUND_S
 
 
-def test_a_late_answer_is_never_taken_for_another_s(bench: EmulatedStage) -> None:
+def test_a_late_answer_is_never_taken_for_another(bench: EmulatedStage) -> None:
     """Position asked while it comes late, then moved, then asked again, over and over."""
     for angle_deg in (20.0, -20.0, 30.0):
         bench.wire.inject(Fault("late", 0.4))
@@ -131,14 +134,12 @@ def test_a_late_answer_is_never_taken_for_another_s(bench: EmulatedStage) -> Non
         assert bench.stage.position_deg() == pytest.approx(angle_deg, abs=1e-3)
 
 
-def test_a_stop_goes_out_while_an_answer_is_owed() -> None:
+def test_a_stop_is_sent_while_a_reply_is_pending() -> None:
     for make in EMULATED_STAGES.values():
         with make(SLOW) as bench:
             bench.stage.home()
             bench.stage.start_move(70.0)
             bench.wire.inject(Fault("drop"), Fault("drop"))
-            import threading
-
             asking = threading.Thread(target=_ask, args=(bench,))
             sent = len(bench.wire.seen)
             asking.start()
@@ -150,6 +151,11 @@ def test_a_stop_goes_out_while_an_answer_is_owed() -> None:
                 assert time.monotonic() - begun_s < 0.3
                 time.sleep(0.001)
             asking.join(BOUND_S)
+
+
+def test_a_missing_port_is_named_with_advice(tmp_path: Path) -> None:
+    with pytest.raises(PortGone, match=r"theta_r: cannot open .*nowhere.*look at the cable"):
+        Line("theta_r", str(tmp_path / "nowhere"), 57600, SystemClock())
 
 
 def _ask(bench: EmulatedStage) -> None:

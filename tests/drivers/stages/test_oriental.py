@@ -1,10 +1,10 @@
-"""The AZ drive's driver: literal bytes, and how the stage behaves over both lines."""
+"""AZ drive's driver over RTU and TCP: moves, stops, alarms, and refusal of other devices."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 import sim.emulated.oriental_controller
 from drivers.lines.modbus_bus import ModbusBus
-from drivers.lines.serial_line import NoReply, PortGone
+from drivers.lines.serial_line import NoReply
 from drivers.stages.motor_stage import Stopped
-from drivers.stages.oriental import OrientalStage
+from drivers.stages.oriental import OrientalSettings, OrientalStage
 from instrument.clock import SystemClock
 from instrument.errors import DeviceError, InputError
 from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway
@@ -33,6 +33,7 @@ from tests.support.stages.emulated_az_drive import (
     az_settings,
     emulated_drive,
 )
+from tests.support.stages.waiting import wait_until
 
 pytestmark = pytest.mark.waits
 
@@ -52,13 +53,13 @@ def slow_at(request: pytest.FixtureRequest) -> Iterator[EmulatedDrive]:
         yield made
 
 
-def test_who_answers_is_said(at: EmulatedDrive) -> None:
+def test_identity_and_opening_report(at: EmulatedDrive) -> None:
     stage = at.open()
     assert stage.identity() == "Oriental Motor AZ drive, by its registers, unit 1"
     assert "output 4020 hex, no alarm" in stage.opening_report
 
 
-def test_it_homes_moves_and_says_where_it_is(at: EmulatedDrive) -> None:
+def test_homing_moves_and_positions(at: EmulatedDrive) -> None:
     stage = at.homed()
     assert at.drive.homings == 1
     for count, angle in enumerate((12.34, -56.78, 169.994, 0.0), start=1):
@@ -87,7 +88,7 @@ def test_nothing_moves_before_homing(at: EmulatedDrive) -> None:
     assert not at.sent(MOVE_WRITE)
 
 
-def test_the_position_is_the_feedback_not_what_was_commanded(slow_at: EmulatedDrive) -> None:
+def test_the_position_is_the_feedback_and_not_the_command(slow_at: EmulatedDrive) -> None:
     stage = slow_at.homed()
     stage.start_move(90.0)
     assert stage.position_deg() < 45.0
@@ -126,7 +127,7 @@ def test_a_stop_waits_for_one_lost_answer_at_most(slow_at: EmulatedDrive) -> Non
     slow_at.wire.inject(Fault("drop"), Fault("drop"))
     reading = threading.Thread(target=stage.position_deg)
     reading.start()
-    _until(lambda: len(slow_at.wire.seen) > since)
+    wait_until(lambda: len(slow_at.wire.seen) > since)
     before_s = time.monotonic()
     stage.stop()  # its own first answer is dropped too
     assert slow_at.sent(STOP_TCP, since)[0] - before_s < 0.3
@@ -142,14 +143,14 @@ def test_a_stop_does_not_wait_until_the_line_is_quiet(slow_at: EmulatedDrive) ->
     reading = threading.Thread(target=stage.position_deg)
     begun_s = time.monotonic()
     reading.start()
-    _until(lambda: time.monotonic() - begun_s > 0.3)  # past the time-out: it listens for quiet
+    wait_until(lambda: time.monotonic() - begun_s > 0.3)  # past the time-out: it listens for quiet
     since, before_s = len(slow_at.wire.seen), time.monotonic()
     stage.stop()
     assert slow_at.sent(STOP_TCP, since)[0] - before_s < 0.1
     reading.join(timeout=5)
 
 
-def test_a_stop_left_in_the_drive_is_taken_back_before_the_first_motion(at: EmulatedDrive) -> None:
+def test_a_stop_left_in_the_drive_is_cleared_before_the_first_motion(at: EmulatedDrive) -> None:
     at.drive.serve(STOP_TCP)
     stage = at.homed()
     stage.start_move(1.0)
@@ -170,7 +171,7 @@ def test_an_alarm_ends_the_wait_and_forbids_moves(slow_at: EmulatedDrive) -> Non
     assert (slow_at.drive.triggers, slow_at.drive.homings) == (1, 1)
 
 
-def test_a_target_beyond_the_drives_own_limits_is_its_alarm() -> None:
+def test_a_target_beyond_the_drives_own_limits_raises_its_alarm() -> None:
     with emulated_drive("pty", replace(FAST, max_deg=90.0)) as at:
         stage = at.homed()
         stage.start_move(100.0)
@@ -179,18 +180,18 @@ def test_a_target_beyond_the_drives_own_limits_is_its_alarm() -> None:
         assert at.motor.position_deg == 0.0
 
 
-def test_a_held_stage_is_noticed() -> None:
+def test_a_blocked_stage_is_reported_as_stalled() -> None:
     with emulated_drive("pty", SLOW, SLOW_LIMITS) as at:
         stage = at.homed()
         stage.start_move(30.0)
-        _until(lambda: at.motor.position_deg > 0.5)
+        wait_until(lambda: at.motor.position_deg > 0.5)
         at.motor.hold()
         with pytest.raises(DeviceError, match="stalled"):
             stage.wait()
         assert not at.motor.moving
 
 
-def test_a_held_motor_is_the_drives_overload(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_blocked_motor_raises_the_drives_overload_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sim.emulated.oriental_controller, "OVERLOAD_S", 0.2)
     with emulated_drive("pty", SLOW, SLOW_LIMITS) as at:
         stage = at.homed()
@@ -200,7 +201,7 @@ def test_a_held_motor_is_the_drives_overload(monkeypatch: pytest.MonkeyPatch) ->
             stage.wait()
 
 
-def test_a_reference_that_is_not_found_is_an_error_and_a_stop() -> None:
+def test_homing_without_a_reference_ends_with_an_error_and_a_stop() -> None:
     with emulated_drive("pty", FAST, replace(LIMITS, homing_s=0.2)) as at:
         at.motor.homing_fails = True
         stage = at.open()
@@ -210,7 +211,7 @@ def test_a_reference_that_is_not_found_is_an_error_and_a_stop() -> None:
         assert not at.motor.homing
 
 
-def test_a_drive_that_is_not_ready_takes_no_move(at: EmulatedDrive) -> None:
+def test_no_move_is_sent_to_a_drive_that_is_not_ready(at: EmulatedDrive) -> None:
     stage = at.homed()
     at.drive.serve(bytes.fromhex("06 007D 0040"))  # FREE: the motor is without current
     with pytest.raises(DeviceError, match=r"not ready to move .* STOP and FREE"):
@@ -218,7 +219,7 @@ def test_a_drive_that_is_not_ready_takes_no_move(at: EmulatedDrive) -> None:
     assert at.drive.triggers == 0
 
 
-def test_a_stage_on_its_way_is_left_alone(at: EmulatedDrive) -> None:
+def test_a_moving_stage_refuses_commands(at: EmulatedDrive) -> None:
     stage = at.homed()
     at.motor.move(170.0)
     at.motor.hold()
@@ -248,8 +249,8 @@ def test_several_drives_share_one_line(kind: str) -> None:
     assert [drive.triggers for drive in drives] == [1, 1]
 
 
-class Says:
-    """Answers every request alike."""
+class Parrot:
+    """Gives the same answer to every request."""
 
     def __init__(self, answer: str, check: bool = True) -> None:
         data = bytes.fromhex(answer)
@@ -273,71 +274,33 @@ class Says:
         ("01 7F 00 00", "no whole answer|an answer to function"),
     ],
 )
-def test_what_does_not_answer_like_a_drive_is_refused(answer: str, says: str) -> None:
-    with PtyWire([Says(answer)]) as wire, pytest.raises(DeviceError, match=says):
+def test_a_device_that_does_not_answer_like_a_drive_is_refused(answer: str, says: str) -> None:
+    with PtyWire([Parrot(answer)]) as wire, pytest.raises(DeviceError, match=says):
         OrientalStage("theta_r", az_settings(wire.port, reply_s=0.05), SystemClock())
 
 
 @settings(max_examples=15)
 @given(st.binary(min_size=1, max_size=40))
-def test_noise_instead_of_an_answer_is_an_error_that_is_ours(noise: bytes) -> None:
-    with PtyWire([Says(noise.hex(), check=False)]) as wire, pytest.raises(DeviceError):
+def test_noise_instead_of_an_answer_is_a_device_error(noise: bytes) -> None:
+    with PtyWire([Parrot(noise.hex(), check=False)]) as wire, pytest.raises(DeviceError):
         OrientalStage("theta_r", az_settings(wire.port, reply_s=0.004), SystemClock())
 
 
-def test_a_drive_with_other_ranges_is_none() -> None:
+def test_a_device_with_values_out_of_range_is_refused() -> None:
     with emulated_drive("pty") as at:
         at.drive.serve(bytes.fromhex("10 0058 0002 04 0000 03E7"))
         with pytest.raises(DeviceError, match="is no Oriental Motor AZ drive: data number 999"):
             at.open()
 
 
-def test_silence_is_said_within_two_seconds(at: EmulatedDrive) -> None:
+def test_silence_is_an_error_within_two_seconds(at: EmulatedDrive) -> None:
     begun_s = time.monotonic()
     with pytest.raises(NoReply, match=r"no answer|did not answer"):
         at.open(unit=7)
     assert time.monotonic() - begun_s < 2.0
 
 
-@pytest.mark.parametrize(
-    ("port", "says"),
-    [("/dev/none", "cannot open /dev/none"), ("tcp://localhost:1", "cannot open tcp://localhost")],
-)
-def test_a_port_that_is_not_there_is_named(port: str, says: str) -> None:
-    with pytest.raises(PortGone, match=says):
-        OrientalStage("theta_r", az_settings(port, parity="E"), SystemClock())
-
-
-@pytest.mark.parametrize("port", ["tcp://", "tcp://host:high"])
-def test_an_address_that_is_none_is_refused(port: str) -> None:
-    with pytest.raises(InputError, match=port):
-        OrientalStage("theta_r", az_settings(port, parity="E"), SystemClock())
-
-
-def test_a_parity_that_the_port_refuses_is_said() -> None:
-    with PtyWire([]) as wire, pytest.raises(PortGone, match=r"'X': look at .*, at the parity"):
-        OrientalStage("theta_r", az_settings(wire.port, parity="X"), SystemClock())
-
-
-def test_a_closed_line_stays_closed(at: EmulatedDrive) -> None:
-    stage = at.homed()
-    stage.close()
-    stage.close()
-    for action in (stage.status, stage.stop):
-        with pytest.raises(PortGone, match="it was closed"):
-            action()
-
-
-def test_a_gateway_that_has_hung_up_is_called_again() -> None:
-    with emulated_drive("tcp") as at:
-        stage = at.homed()
-        peer = at.wire._peer  # type: ignore[union-attr]  # a TcpWire's
-        assert peer is not None
-        peer.shutdown(2)
-        assert stage.position_deg() == 0.0
-
-
-def test_a_point_costs_little(at: EmulatedDrive) -> None:
+def test_a_move_costs_few_requests_and_little_time(at: EmulatedDrive) -> None:
     stage, spent = at.homed(), []
     for _ in range(9):
         since, begun_s = len(at.wire.seen), time.monotonic()
@@ -348,8 +311,9 @@ def test_a_point_costs_little(at: EmulatedDrive) -> None:
     assert min(spent) < 0.04
 
 
-def _until(true: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + 5
-    while not true():
-        assert time.monotonic() < deadline_s
-        time.sleep(0.001)
+@pytest.mark.parametrize(
+    "wrong", [{"steps_per_deg": 0.0}, {"steps_per_deg": 10.0}, {"current": 1001}, {"current": 0}]
+)
+def test_settings_that_cannot_be_kept_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(InputError, match=r"0|tolerance_deg|1001"):
+        OrientalSettings(**{"port": "x", "steps_per_deg": 100.0, "limits": LIMITS} | wrong)  # type: ignore[arg-type]  # one wrong value at a time

@@ -1,10 +1,11 @@
-"""A motion of which nothing is heard is stopped, whatever the program is busy with."""
+"""Watchdog: a motion without a status report is stopped, whatever the program is doing."""
 
 from __future__ import annotations
 
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -12,35 +13,35 @@ from drivers.stages.watchdog import SILENT_S, Watchdog
 from instrument.clock import SystemClock
 from instrument.errors import DeviceError
 from sim.emulated.wire import Fault
-from tests.drivers.stages.test_motor_stage import until
 from tests.support.stages.emulated_stages import EMULATED_STAGES, SLOW, EmulatedStage
+from tests.support.stages.waiting import wait_until
 
 pytestmark = pytest.mark.waits
 
 SILENCE = [Fault("drop")] * 500
-SLACK_S = 0.4  # a stop may wait for the answer that another question is owed; CI has two cores
+SLACK_S = 0.4  # a stop may wait for a pending answer; CI has two cores
 
 
 @pytest.fixture(params=list(EMULATED_STAGES))
 def bench(request: pytest.FixtureRequest) -> Iterator[EmulatedStage]:
-    """A slow stage under way, and nobody who waits for it."""
+    """A slow stage under way, while nobody waits for it."""
     with EMULATED_STAGES[request.param](SLOW) as bench:
         bench.stage.home()
         bench.stage.start_move(70.0)  # takes 3.5 s
-        until(lambda: bench.motor.position_deg > 1.0)
+        wait_until(lambda: bench.motor.position_deg > 1.0)
         yield bench
 
 
-def test_while_nobody_asks_the_watchdog_does_and_the_move_goes_on(bench: EmulatedStage) -> None:
-    until(lambda: bench.motor.position_deg > 30.0)  # more than a second later, at 20 deg/s
+def test_the_watchdog_probes_while_nobody_polls_and_the_move_goes_on(bench: EmulatedStage) -> None:
+    wait_until(lambda: bench.motor.position_deg > 30.0)  # more than a second later, at 20 deg/s
     assert bench.motor.moving
     assert bench.stage.wait() == pytest.approx(70.0, abs=1e-2)
 
 
-def test_a_silent_line_ends_the_motion_though_nobody_waits(bench: EmulatedStage) -> None:
+def test_a_silent_line_ends_the_motion_if_nobody_waits(bench: EmulatedStage) -> None:
     silent_s = time.monotonic()
     bench.wire.inject(*SILENCE)
-    until(lambda: not bench.motor.moving)
+    wait_until(lambda: not bench.motor.moving)
     assert time.monotonic() - silent_s < SILENT_S + SLACK_S
     assert bench.motor.position_deg < 60.0
     with pytest.raises(DeviceError, match=r"theta_r.*no status for 0.5 s while it moved"):
@@ -51,22 +52,20 @@ def test_a_silent_line_ends_the_motion_while_it_is_waited_for(bench: EmulatedSta
     threading.Timer(0.1, lambda: bench.wire.inject(*SILENCE)).start()
     with pytest.raises(DeviceError, match=r"theta_r.*told to stop"):
         bench.stage.wait()
-    until(lambda: not bench.motor.moving)
+    wait_until(lambda: not bench.motor.moving)
     assert bench.motor.position_deg < 60.0
 
 
-def test_homing_is_watched_as_well() -> None:
-    import dataclasses
-
+def test_homing_is_watched_too() -> None:
     for make in EMULATED_STAGES.values():
-        with make(dataclasses.replace(SLOW, homing_s=10.0)) as bench:
+        with make(replace(SLOW, homing_s=10.0)) as bench:
             threading.Timer(0.1, lambda wire=bench.wire: wire.inject(*SILENCE)).start()
             with pytest.raises(DeviceError, match="told to stop"):
                 bench.stage.home()
-            until(lambda motor=bench.motor: not motor.homing)
+            wait_until(lambda motor=bench.motor: not motor.homing)
 
 
-def test_it_watches_only_while_something_moves() -> None:
+def test_the_watchdog_runs_only_during_a_motion() -> None:
     stops: list[float] = []
     watchdog = Watchdog(
         "theta_r", lambda: False, lambda: stops.append(time.monotonic()), SystemClock()
@@ -75,7 +74,7 @@ def test_it_watches_only_while_something_moves() -> None:
     watchdog.end()
     begun_s = time.monotonic()
     watchdog.begin()
-    until(lambda: bool(stops))
+    wait_until(lambda: bool(stops))
     assert SILENT_S < stops[0] - begun_s < SILENT_S + SLACK_S
     assert len(stops) == 1
     assert watchdog.fired

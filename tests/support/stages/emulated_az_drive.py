@@ -25,6 +25,11 @@ FAST = Mechanics(speed_deg_per_s=2000.0, acceleration_deg_per_s2=100e3, homing_s
 SLOW = Mechanics(speed_deg_per_s=10.0, acceleration_deg_per_s2=1000.0, homing_s=0.03)
 WIRES = ("pty", "tcp")
 
+# The maker's example: direct operation to 8500 steps at 2000 Hz, 1.5 kHz/s.
+MAKERS_EXAMPLE = bytes.fromhex(
+    "01 10 0058 0010 20 00000000 00000001 00002134 000007D0 000005DC 000005DC 000003E8 00000001E343"
+)
+
 
 def az_settings(port: str, **changes: object) -> OrientalSettings:
     """Settings of a drive with 100 steps per degree on this port."""
