@@ -21,7 +21,7 @@ from sim.clock import SimulatedClock
 from sim.scene.camera import SimulatedCamera
 from sim.scene.scene import Scene
 from tests.support.paths import CONFIGS
-from tests.support.v4l2.remote_camera import QUICK, SETTINGS, Bench, child, served
+from tests.support.v4l2.remote_camera import QUICK, SETTINGS, LevelScene, child, served
 
 EXPOSURES_S = (0.001, 0.004, 0.002)
 
@@ -37,7 +37,7 @@ def camera(
             scene.set_axis(axis, angle_deg)
         yield SimulatedCamera(scene, SimulatedClock())
     elif request.param == "v4l2":
-        with child(tmp_path_factory) as remote, served(remote, Bench(), QUICK):
+        with child(tmp_path_factory) as remote, served(remote, LevelScene(), QUICK):
             remote.ask("open", replace(SETTINGS, gain=None))
             yield remote  # type: ignore[misc]  # closed with its process
     else:

@@ -266,7 +266,7 @@ class Parrot:
         ("01 83 02", r"register 00(58|7E) hex at .*: exception 02 \(illegal data address\)"),
         ("01 83 63", r"exception 63 \(not known here\)"),
         ("01 83 0B", "the device behind the gateway did not answer"),
-        ("", "no answer within 0.05 s"),
+        ("", "no answer within 0.1 s"),
         ("02 03 04 00000000", "no whole answer"),  # another unit's
         ("01 10 0058 0010", "an answer to function 16"),
         ("01 03 04 00000000", "2 registers instead of"),
@@ -276,7 +276,7 @@ class Parrot:
 )
 def test_a_device_that_does_not_answer_like_a_drive_is_refused(answer: str, says: str) -> None:
     with PtyWire([Parrot(answer)]) as wire, pytest.raises(DeviceError, match=says):
-        OrientalStage("theta_r", az_settings(wire.port, reply_s=0.05), SystemClock())
+        OrientalStage("theta_r", az_settings(wire.port, reply_s=0.1), SystemClock())
 
 
 @settings(max_examples=15)

@@ -1,4 +1,4 @@
-"""Which frames count: no frame that began before the call, none with the old exposure."""
+"""Frame filter: no frame that began before the request, none with the old exposure."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ exposures = st.floats(1e-4, 5.0)
 def sensor(
     changes: list[tuple[float, float]], overhead_s: float, phase_s: float, delay_frames: int
 ) -> list[tuple[float, float]]:
-    """Start and exposure of the frames of a free-running sensor.
+    """Start and exposure of each frame of a free-running sensor.
 
-    `changes`: when which exposure was set. It reaches the sensor `delay_frames` frames late.
+    `changes`: time and value of each exposure set. It takes effect `delay_frames` frames late.
     """
     frames: list[tuple[float, float]] = []
     start_s, pipeline = phase_s, [changes[0][1]] * delay_frames
@@ -37,7 +37,7 @@ def sensor(
     delay_frames=st.integers(0, 3),
     stamp_at_end=st.booleans(),
 )
-def test_what_counts_began_after_the_call_at_the_new_exposure(
+def test_accepted_frames_began_after_the_request_at_the_new_exposure(
     old_s: float,
     new_s: float,
     overhead_s: float,
@@ -61,8 +61,8 @@ def test_what_counts_began_after_the_call_at_the_new_exposure(
             assert frame_filter.longest_exposure_s == new_s
 
 
-def test_frames_are_not_thrown_away_without_need() -> None:
-    """A steady camera, stamps at the end: at most two frames beyond the first that began later."""
+def test_few_frames_are_rejected_needlessly() -> None:
+    """Steady camera, stamps at the end: at most two frames after the first that began later."""
     frame_filter = FrameFilter(0.01, 0.03, 2, None)
     frame_filter.request(0.0)
     stamps = [frame_filter.accepts(0.03 * n + 0.005) for n in range(10)]
@@ -79,7 +79,7 @@ def test_an_unchanged_exposure_costs_no_frames() -> None:
 
 
 @pytest.mark.parametrize("late", [0, 2])
-def test_without_a_clock_frames_are_counted(late: int) -> None:
+def test_without_comparable_time_stamps_frames_are_counted(late: int) -> None:
     frame_filter = FrameFilter(0.01, 0.005, late, 6)
     frame_filter.request(0.0)
     assert [frame_filter.accepts(0.0) for _ in range(10)].index(True) == 6 + late

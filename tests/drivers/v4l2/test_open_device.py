@@ -1,4 +1,4 @@
-"""Opening a V4L2 camera: everything is read back, and what went wrong is said with values."""
+"""Opening a V4L2 camera: every setting is read back, and errors state the values."""
 
 from __future__ import annotations
 
@@ -16,19 +16,13 @@ from instrument.errors import DeviceError
 from sim.emulated.v4l2.device import CameraFaults
 from tests.support.v4l2.remote_camera import (
     DEVICE,
+    FOUND_WITHIN_S,
     SETTINGS,
-    Bench,
+    WHO,
+    LevelScene,
     RemoteCamera,
     served,
 )
-
-WHO = re.escape(f"camera Emulated camera ({DEVICE})")
-FOUND_WITHIN_S = 2.0  # beyond the exposure
-
-
-@pytest.fixture
-def bench() -> Bench:
-    return Bench()
 
 
 def fault(**values: Any) -> Callable[[CameraFaults], None]:
@@ -99,50 +93,42 @@ OPENING = [
 
 
 @pytest.mark.parametrize(("spoil", "changes", "message"), OPENING)
-def test_an_opening_that_went_wrong_says_what_was_asked_and_given(
+def test_a_failed_opening_states_the_request_and_the_answer(
     remote: RemoteCamera,
-    bench: Bench,
+    scene: LevelScene,
     spoil: Callable[[CameraFaults], None],
     changes: dict[str, Any],
     message: str,
 ) -> None:
-    with served(remote, bench) as camera:
+    with served(remote, scene) as camera:
         spoil(camera.faults)
         with pytest.raises(DeviceError, match=f"^camera .*{re.escape(DEVICE)}.?: {message}"):
             remote.ask("open", replace(SETTINGS, **changes))
 
 
-def test_a_gain_that_the_camera_does_not_have(remote: RemoteCamera, bench: Bench) -> None:
+def test_padded_rows_are_refused(remote: RemoteCamera, scene: LevelScene) -> None:
     with (
-        served(remote, bench, without_controls=frozenset({ioctl.GAIN})),
-        pytest.raises(DeviceError, match=f"{WHO}: gain 100 asked for, but the camera has no such"),
-    ):
-        remote.ask("open", SETTINGS)
-
-
-def test_padded_rows_are_refused(remote: RemoteCamera, bench: Bench) -> None:
-    with (
-        served(remote, bench, row_padding_bytes=32),
+        served(remote, scene, row_padding_bytes=32),
         pytest.raises(DeviceError, match="a row has 160 bytes, 128 of them pixels"),
     ):
         remote.ask("open", SETTINGS)
 
 
-def test_a_rate_that_the_camera_does_not_reach(remote: RemoteCamera, bench: Bench) -> None:
-    with served(remote, bench):
+def test_a_frame_rate_beyond_the_camera_is_refused(remote: RemoteCamera, scene: LevelScene) -> None:
+    with served(remote, scene):
         remote.ask("open", replace(SETTINGS, frames_per_s=200))
         with pytest.raises(DeviceError, match="400 frames a second asked for, the camera took 200"):
             remote.ask("open", replace(SETTINGS, frames_per_s=400))
 
 
-def test_a_camera_that_another_program_uses(remote: RemoteCamera, bench: Bench) -> None:
-    with served(remote, bench) as camera:
+def test_a_camera_in_use_by_another_program(remote: RemoteCamera, scene: LevelScene) -> None:
+    with served(remote, scene) as camera:
         camera.streamer = "another program"
         with pytest.raises(DeviceError, match=f"{WHO}: .*whether another program uses the camera"):
             remote.ask("open", SETTINGS)
 
 
-def test_no_camera_at_all(remote: RemoteCamera) -> None:
+def test_a_missing_camera_is_reported_in_time(remote: RemoteCamera) -> None:
     start_s = time.monotonic()
     with pytest.raises(DeviceError, match=f"camera {DEVICE}: cannot be opened .*No such file"):
         remote.ask("open", SETTINGS)

@@ -7,6 +7,7 @@ child serves a whole module; each test brings its own device model.
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -37,7 +38,9 @@ if which("cc") is None:
     )
 
 DEVICE = "/dev/v4l/by-id/usb-emulated-camera"
+WHO = re.escape(f"camera Emulated camera ({DEVICE})")
 DEADLINE_S = 20.0
+FOUND_WITHIN_S = 2.0  # beyond the exposure: a lost camera is reported
 SETTINGS = V4l2Settings(
     device=DEVICE, pixel_format="Y16", width_px=64, height_px=48, bit_depth=16,
     min_exposure_s=0.001, max_exposure_s=2.0, gain=100,
@@ -96,7 +99,7 @@ class RemoteCamera:
         return frames
 
 
-class Bench:
+class LevelScene:
     """What the emulated camera looks at: a level, and what was exposed of it when.
 
     Each picture says in its first row what it is of: level, exposure in 100 µs, gain, sequence.
@@ -140,10 +143,10 @@ def steps(frame: Frame) -> int:
 
 @contextmanager
 def served(
-    remote: RemoteCamera, bench: Bench, capabilities: Capabilities = QUICK, **changes: Any
+    remote: RemoteCamera, scene: LevelScene, capabilities: Capabilities = QUICK, **changes: Any
 ) -> Iterator[EmulatedCamera]:
     """The device model while a test needs it; the child lets go of it at the end."""
-    camera = EmulatedCamera(bench.render, bench.snapshot, replace(capabilities, **changes))
+    camera = EmulatedCamera(scene.render, scene.snapshot, replace(capabilities, **changes))
     with V4l2Server(camera, remote.socket):
         try:
             yield camera
