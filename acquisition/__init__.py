@@ -1,1 +1,1 @@
-"""Protocol, plan, engine, record; exposure, window, radiometry; the command line."""
+"""Acquisition: protocol, plan, scan, results and the command line. Start with `cli`."""

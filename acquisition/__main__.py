@@ -1,4 +1,4 @@
-"""`python -m acquisition` is `gonio`."""
+"""Run the command line: `python -m acquisition` is `gonio`."""
 
 from acquisition.cli import main
 

@@ -1,4 +1,4 @@
-"""What `gonio fit` does: read, fit, choose, and say so."""
+"""Command `gonio fit`: read a source, choose a model, print the outcome."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def fit_source(
 
 
 def _names(models: str | None) -> list[str] | None:
-    """Names of models parted by commas; None: those of the ladder."""
+    """Names of models separated by commas; None for those of the ladder."""
     if models is None:
         return None
     names = [name.strip() for name in models.split(",")]
@@ -63,17 +63,17 @@ def _names(models: str | None) -> list[str] | None:
     if wrong:
         raise InputError(*(f"--models: {words}" for words in wrong))
     if len(set(names)) < len(names):
-        raise InputError(f"--models: {models}: a model stands twice; name each once")
+        raise InputError(f"--models: {models}: a model is named twice; name each once")
     return names
 
 
 def _method(method: str, models: str | None) -> MethodOfFit:
-    """How the rough surface is worked out. A model's name says its method."""
+    """Method for rough surfaces; only `auto` goes with --models, whose names imply the method."""
     for known in METHODS:
         if method == known:
             if models is not None and known != "auto":
                 raise InputError(
-                    f"--method: {method}; allowed: auto, as --models names the methods"
+                    f"--method: {method}; allowed: auto, as the names in --models imply the method"
                 )
             return known
     raise InputError(f"--method: {method}; allowed: {', '.join(METHODS)}")
@@ -99,7 +99,7 @@ def _print(source: Source, choice: Choice) -> None:
 
 
 def _table(candidates: Sequence[FitResult], chosen: FitResult) -> Table:
-    """The candidates by rising BIC; K is the number of parameters, ✗ what did not converge."""
+    """Candidates by rising BIC; K is the number of parameters, ✗ marks no convergence."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in ("  candidate", "K", "rms/mean", "χ²/dof", "ΔBIC", "ΔAICc"):
         table.add_column(name, no_wrap=True)
@@ -114,30 +114,31 @@ def _table(candidates: Sequence[FitResult], chosen: FitResult) -> Table:
 
 
 def _short(number: float) -> str:
-    """At most six characters."""
+    """Return the number in at most six characters."""
     if abs(number) < 10:
         return f"{number:.2f}"
     return f"{number:.0f}" if number < 1e6 else f"{number:.0e}"
 
 
 def _notes(source: Source, chosen: FitResult) -> list[str]:
-    """What else one should know of the fit."""
+    """Remarks on the uncertainties, the model's validity, outliers and the end of the search."""
     m, found = source.measurements, []
     if m.u_random is None:
         percent = 100 * float(np.mean(chosen.u_total)) / float(np.mean(m.brdf))
         found.append(
             f"no u is stated: the noise is estimated from the residuals, {percent:.2g} % of the "
-            "mean; every u rests on it"
+            "mean; every u is based on it"
         )
-    beyond = validity_note(chosen)
-    if beyond:
-        found.append(beyond)
+    outside = validity_note(chosen)
+    if outside:
+        found.append(outside)
     if m.relative:
-        found.append("the values are relative: what only scales them is not determined")
+        found.append("the values are relative: parameters that only scale them are undetermined")
     for k in np.flatnonzero(chosen.outliers)[:10]:
         where = f"theta_i {m.theta_i_deg[k]:g}, theta_r {m.theta_r_deg[k]:g}"
         found.append(
-            f"set aside: {where}, dphi {m.dphi_deg[k]:g} degrees ({chosen.residuals[k]:+.1f} u)"
+            f"outlier set aside: {where}, dphi {m.dphi_deg[k]:g} degrees, "
+            f"residual {chosen.residuals[k]:+.1f} u"
         )
     found.append(f"the search ended: {chosen.message}")
     return found

@@ -1,8 +1,7 @@
-"""One scan, from opening the devices to the last reading; what ends it early is written down."""
+"""One scan with its devices, from opening them to the last reading; errors name how to resume."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import closing
 
 from acquisition.engine.engine import Devices, Engine
@@ -21,34 +20,34 @@ from instrument.record.record import Record
 def scan(loaded: Loaded, plan: Plan, record: Record, progress: Progress | None = None) -> None:
     """Run the plan, or what is missing of it; the caller has claimed the run.
 
-    Raises `OperatorStop`, `DeviceError` or `StorageError` with the command that goes on.
+    Raises `OperatorStop`, `DeviceError` or `StorageError` with the command that resumes the scan.
     """
     clock: Clock = SystemClock()
-    with log_to_record(record) as notes:
+    with log_to_record(record) as log:
         try:
             with closing(open_devices(loaded)) as devices:
                 clock = devices.clock
-                _drive(loaded, plan, record, progress, devices, notes)
+                _run(loaded, plan, record, progress, devices, log)
         except (KeyboardInterrupt, OperatorStop) as stop:
             why = str(stop) or "stopped by the operator"
-            _write_down(record, notes, clock, STOPPED, why)
-            ended = "" if notes.troubles else ": all motion has ended."
-            raise OperatorStop(f"{why}{ended} {_go_on(record, notes)}") from None
+            _record_end(record, log, clock, STOPPED, why)
+            ended = "" if log.troubles else ": all motion has ended."
+            raise OperatorStop(f"{why}{ended} {_how_to_resume(record, log)}") from None
         except (DeviceError, StorageError) as error:
-            _write_down(record, notes, clock, FAULT, str(error))
-            raise type(error)(f"{error}\n{_go_on(record, notes)}") from error
+            _record_end(record, log, clock, FAULT, str(error))
+            raise type(error)(f"{error}\n{_how_to_resume(record, log)}") from error
         except Exception as error:
-            _write_down(record, notes, clock, FAULT, f"the program failed: {error!r}")
+            _record_end(record, log, clock, FAULT, f"the program failed: {error!r}")
             raise
 
 
-def _drive(
+def _run(
     loaded: Loaded,
     plan: Plan,
     record: Record,
     progress: Progress | None,
     devices: Devices,
-    notes: EventLogHandler,
+    log: EventLogHandler,
 ) -> None:
     clock, before = devices.clock, progress or Progress()
     begun_s = clock.now_s() - before.elapsed_s
@@ -59,41 +58,37 @@ def _drive(
         soft_wrap=True,
     )
     with progress_bar(plan, before.done) as show:
-        told = _both(show, notes)
-        Engine(loaded.protocol, loaded.rig, devices, record, told).run(plan, progress)
-    notes.write()
+
+        def on_step(step: Step) -> None:
+            log.write()
+            show(step)
+
+        Engine(loaded.protocol, loaded.rig, devices, record, on_step).run(plan, progress)
+    log.write()
     record.add_event(clock.utc().isoformat(), FINISHED, f"{len(plan.steps)} steps")
     record.set_meta("scan_s", f"{clock.now_s() - begun_s:.1f}")
     record.set_meta("finished_utc", clock.utc().isoformat(timespec="seconds"))
-    console.print(_unsafe(notes), end="", highlight=False, soft_wrap=True)
+    console.print(_warnings(log), end="", highlight=False, soft_wrap=True)
 
 
-def _both(show: Callable[[Step], None], notes: EventLogHandler) -> Callable[[Step], None]:
-    def on_step(step: Step) -> None:
-        notes.write()
-        show(step)
-
-    return on_step
-
-
-def _write_down(record: Record, notes: EventLogHandler, clock: Clock, kind: str, why: str) -> None:
-    """Note why a scan ended; where the disk takes nothing more, the message alone has to tell."""
+def _record_end(record: Record, log: EventLogHandler, clock: Clock, kind: str, why: str) -> None:
+    """Record why a scan ended, unless the disk fails: the error message says it as well."""
     try:
-        notes.write()
+        log.write()
         record.add_event(clock.utc().isoformat(), kind, why)
     except StorageError:
         return
 
 
-def _go_on(record: Record, notes: EventLogHandler) -> str:
-    """What is not safe, what is, and the command that goes on."""
-    where = record.current_folder()
-    if where is None:
-        return f"{_unsafe(notes)}Nothing is left to go on from"
-    safe = f"{len(record.readings())} readings are safe in {where}"
-    return f"{_unsafe(notes)}{safe}. Go on with: gonio resume {where}"
+def _how_to_resume(record: Record, log: EventLogHandler) -> str:
+    """Return the state of the rig, the readings that are safe, and the command to resume."""
+    folder = record.current_folder()
+    if folder is None:
+        return f"{_warnings(log)}The run's folder is gone: nothing is left to resume"
+    safe = f"{len(record.readings())} readings are safe in {folder}"
+    return f"{_warnings(log)}{safe}. Go on with: gonio resume {folder}"
 
 
-def _unsafe(notes: EventLogHandler) -> str:
-    """What a person has to see to, a line each; nothing where all is well."""
-    return "".join(f"LOOK AT THE RIG FIRST: {text}\n" for text in notes.troubles)
+def _warnings(log: EventLogHandler) -> str:
+    """Return one line for each trouble that a person must look at, empty if there is none."""
+    return "".join(f"LOOK AT THE RIG FIRST: {text}\n" for text in log.troubles)

@@ -1,1 +1,1 @@
-"""acquisition/results."""
+"""Results of a run: reduced values, fit, table and report. Start with `finish.finish`."""

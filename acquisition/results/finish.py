@@ -1,4 +1,4 @@
-"""From a finished record to its results: measurements.csv, fit.json, report.html."""
+"""Results of a record: reduce, fit, and write measurements.csv, fit.json and report.html."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from instrument.text.atomic_file import write_whole
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a person and a script are told at the end; `fit` is what fit.json holds."""
+    """Results to print; `fit` is the content of fit.json."""
 
     headline: str
     parameters: tuple[Parameter, ...]
@@ -34,7 +34,7 @@ class Outcome:
 
 
 def finish(record: Record, loaded: Loaded) -> Outcome:
-    """Reduce, fit and report; each file in the run's folder is written whole or not at all.
+    """Reduce, fit and report; each file in the run's folder is written completely or not at all.
 
     Raises `NotDetermined` where nothing was measured, `StorageError` where the disk fails.
     """
@@ -52,19 +52,28 @@ def finish(record: Record, loaded: Loaded) -> Outcome:
         no_fit_json(fitted.reason) if fitted.choice is None else to_json(fitted.choice),
         record.folder / "report.html",
     )
-    with _kept(record.folder):
-        write_whole(record.folder / "measurements.csv", measurements_csv(reduced, u_brdf))
+    with _recovery_named(record.folder):
+        table = measurements_csv(reduced, u_brdf)
+        write_whole(record.folder / "measurements.csv", table)
         write_whole(record.folder / "fit.json", json.dumps(outcome.fit, indent=2, allow_nan=False))
-    words = (outcome.headline, outcome.notes)
-    shown = report_data(reduced, fitted, budget(reduced, u_brdf), words, record, loaded)
-    with _kept(record.folder):
-        write_report(outcome.report, shown)
+    content = report_data(
+        reduced,
+        fitted,
+        record,
+        loaded,
+        u_brdf=u_brdf,
+        budget=budget(reduced, u_brdf),
+        headline=outcome.headline,
+        notes=outcome.notes,
+    )
+    with _recovery_named(record.folder):
+        write_report(outcome.report, content)
     return outcome
 
 
 @contextmanager
-def _kept(run: Path) -> Iterator[None]:
-    """Say how to go on where the disk does not take a result (`StorageError`)."""
+def _recovery_named(run: Path) -> Iterator[None]:
+    """Add to a `StorageError` the command that writes the results later."""
     try:
         yield
     except StorageError as error:

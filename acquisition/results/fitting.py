@@ -1,9 +1,9 @@
-"""From reduced readings to the choice of a model: what the fit sees, and what it says."""
+"""Fit of a run: from reduced readings to measurements, and to the choice of a model."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,21 +19,29 @@ from instrument.geometry import BoolArray, FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """The choice, or None and the reason why there is none; `used` marks the fitted points (N,)."""
+    """Choice of a model for a run of N points, or None and the reason for it.
+
+    used: mask (N,) of the points that were fitted. measurements: those points as the fit had them,
+    None where there is no choice.
+    """
 
     choice: Choice | None
     used: BoolArray
     reason: str
+    measurements: Measurements | None = None
 
     @property
     def chosen(self) -> FitResult | None:
-        """The chosen candidate."""
+        """The chosen candidate, None if there is none."""
         if self.choice is None or self.choice.chosen is None:
             return None
         return next(c for c in self.choice.candidates if c.model == self.choice.chosen)
 
     def u_brdf(self, reduced: Reduced) -> FloatArray:
-        """Standard uncertainty of every BRDF (N,), 1/sr: with the angles' share where fitted."""
+        """Standard uncertainty of every BRDF, (N,) in 1/sr.
+
+        That of fitted points includes the part from the angles, which needs a model.
+        """
         u = np.abs(reduced.brdf) * root_sum_square(list(reduced.parts.values()))
         if self.chosen is not None and reduced.has_brdf:
             u[self.used] = self.chosen.u_total
@@ -41,48 +49,57 @@ class Fitted:
 
 
 def fit_run(reduced: Reduced, loaded: Loaded) -> Fitted:
-    """Fit the sound points; what keeps a fit from being made is said, not raised."""
+    """Fit the valid points; where no fit is possible, return the reason."""
     acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
     asked = loaded.protocol.fit
     try:
-        choice = choose(
-            measurements(reduced, loaded), acceptance, asked.models, method=asked.method
-        )
+        fitted = measurements(reduced, loaded)
+        choice = choose(fitted, acceptance, asked.models, method=asked.method)
     except (NotDetermined, ValueError) as error:  # too few points, or none that shows light
-        return Fitted(None, reduced.sound, str(error))
-    return Fitted(choice, reduced.sound, choice.reason)
+        return Fitted(None, reduced.valid, str(error))
+    return Fitted(choice, reduced.valid, choice.reason, fitted)
 
 
-def cost_of(
-    names: Sequence[str], reduced: Reduced, chosen: FitResult, loaded: Loaded
+def u_without(
+    components: Sequence[str], fitted: Fitted, reduced: Reduced
 ) -> dict[str, tuple[float, float]]:
-    """u of each determined parameter of the chosen model with, and without, some parts of u."""
-    with_them = stated_u(chosen, measurements(reduced, loaded))
-    without = stated_u(chosen, measurements(reduced, loaded, without=names))
-    return {name: (with_them[name], without[name]) for name in with_them}
+    """Standard uncertainty of each determined parameter with and without `components` of u.
 
-
-def measurements(reduced: Reduced, loaded: Loaded, without: Sequence[str] = ()) -> Measurements:
-    """The sound points as the fit sees them, `without` some parts of their uncertainty.
-
-    Without a white tile they are relative: radiance over cos(theta_i), which goes as the BRDF at
-    one setting of the lamp; how bright the lamp is at each setting is not known.
+    In the parameters' units, from the stated uncertainties alone, for the chosen model.
     """
-    keep = reduced.sound
+    chosen, m = fitted.chosen, fitted.measurements
+    if chosen is None or m is None:
+        return {}
+    other = [u[fitted.used] for name, u in reduced.components.items() if name not in components]
+    fewer = replace(
+        m,
+        u_random=root_sum_square(other) * np.abs(m.brdf),
+        shared=tuple(error for error in m.shared if error.name not in components),
+    )
+    stated, without = stated_u(chosen, m), stated_u(chosen, fewer)
+    return {name: (stated[name], without[name]) for name in stated}
+
+
+def measurements(reduced: Reduced, loaded: Loaded) -> Measurements:
+    """Return the valid points as the fit takes them.
+
+    Without a white tile they are relative: radiance over cos(theta_i) is proportional to the BRDF
+    at one lamp setting, and the lamp's level at each setting is unknown.
+    """
+    keep = reduced.valid
     points = [p for p, kept in zip(reduced.points, keep, strict=True) if kept]
-    own = [u[keep] for name, u in reduced.components.items() if name not in without]
     theta_i_deg, axes = np.array([p.theta_i_deg for p in points]), loaded.rig.axes
-    shared = (*reduced.shared, *reduced.shared_by_tile)
     brdf = reduced.brdf if reduced.has_brdf else reduced.radiance
     brdf = brdf[keep] if reduced.has_brdf else brdf[keep] / np.cos(np.radians(theta_i_deg))
+    u_relative = root_sum_square([u[keep] for u in reduced.components.values()])
     return Measurements(
         theta_i_deg=theta_i_deg,
         theta_r_deg=np.array([p.theta_r_deg for p in points]),
         dphi_deg=np.array([p.dphi_deg for p in points]),
         brdf=brdf,
-        u_random=root_sum_square(own) * np.abs(brdf),
+        u_random=u_relative * np.abs(brdf),
         lamp_setting=np.array([p.lamp_setting for p in points], dtype=np.int64),
-        shared=tuple(e.subset(keep) for e in shared if e.name not in without),
+        shared=tuple(e.subset(keep) for e in (*reduced.shared, *reduced.shared_by_tile)),
         u_theta_i_deg=axes.theta_i.u_deg,
         u_theta_r_deg=axes.theta_r.u_deg,
         u_dphi_deg=axes.dphi.u_deg,

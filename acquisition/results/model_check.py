@@ -1,4 +1,4 @@
-"""Are the models that a protocol names known, and are their parameters right?"""
+"""Check of the models that a protocol or an option names, and of their parameters."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from instrument.geometry import Geometry
 
 
 def check_model(name: str, parameters: Mapping[str, float] | None) -> str | None:
-    """What is wrong with a model and its parameters (None: only the name is asked), or None."""
+    """Return the error of a model's name or parameters, or None; parameters None: name only."""
     try:
         model = MODELS[name]
         if parameters is not None:

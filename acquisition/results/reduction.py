@@ -1,8 +1,9 @@
-"""From the record's counts to radiance and BRDF, each with the uncertainties it came with.
+"""Radiance and BRDF of a run, from the record's counts, with each component of uncertainty.
 
-radiance = counts per second, corrected for the lamp's drift: relative, as the rig has no absolute
-calibration. brdf = (radiance of the sample / radiance of the white tile under the same lamp) times
-reflectance / pi of the tile, taken as Lambertian (Nicodemus et al. 1977, section 3).
+radiance: counts per second, corrected for lamp drift. It is relative: the rig has no absolute
+calibration. BRDF: radiance of the sample over that of the white tile at the same lamp setting,
+times the tile's reflectance / pi. The tile is assumed to be Lambertian (Nicodemus et al. 1977,
+section 3). Use `reduced_run` for a record, and `reduce` for readings in memory.
 """
 
 from __future__ import annotations
@@ -20,20 +21,24 @@ from instrument.geometry import BoolArray, FloatArray
 from instrument.record.reading import Check, Reading
 from instrument.record.record import Record
 
+# Components of uncertainty, and flags of points, as files and reports call them.
 NOISE, ROUNDING, DRIFT = "photon and read noise", "rounding to counts", "lamp drift"
 DARK, PLACEMENT, TEXTURE = "dark frames", "sample placement", "texture at the window edge"
 NO_TILE_YET, NO_SIGNAL = "no white tile yet", "no signal"
 TILE_READING, TILE = "white tile reading", "white tile certificate"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reduced:
-    """All points of a run, arrays of shape (N,). brdf in 1/sr, nan where no reference was taken.
+    """Points of a run, complete or not: arrays of shape (N,).
 
-    `components`: relative standard uncertainties by name, independent from point to point.
-    `shared`: those of the radiance that points share; `shared_by_tile`: those that the comparison
-    with the tile adds. `drift_levels`: the lamp's level at each usable check, block by block, of
-    `drift_checks` that were made.
+    radiance: in counts/s. brdf: in 1/sr, NaN where there is no white tile.
+    components: relative standard uncertainties by name, independent from point to point.
+    shared: errors of the radiance that points share. shared_by_tile: those that the comparison
+        with the white tile adds.
+    flags: empty for a good point.
+    drift_levels: lamp level relative to the first check, at each usable check, one array a block.
+    drift_checks: number of drift checks that were made.
     """
 
     points: tuple[Reading, ...]
@@ -48,34 +53,34 @@ class Reduced:
 
     @property
     def parts(self) -> dict[str, FloatArray]:
-        """Every relative standard uncertainty of the BRDF by name, shared or not, 0 or more."""
+        """Standard uncertainties of the BRDF by name, (N,) and relative, independent and shared."""
         found = dict(self.components)
         for error in (*self.shared, *self.shared_by_tile):
-            sofar = found.get(error.name, np.zeros(len(self.points)))
-            found[error.name] = np.hypot(sofar, error.u_relative)
+            so_far = found.get(error.name, np.zeros(len(self.points)))
+            found[error.name] = np.hypot(so_far, error.u_relative)
         return found
 
     @property
     def u_radiance(self) -> FloatArray:
-        """Standard uncertainty of the radiance, in its unit."""
+        """Standard uncertainty of the radiance, (N,) in counts/s."""
         own = [*self.components.values(), *(e.u_relative for e in self.shared)]
         return np.abs(self.radiance) * root_sum_square(own)
 
     @property
-    def sound(self) -> BoolArray:
-        """Points that may enter a fit: nothing flagged, and measured against a tile if any was."""
+    def valid(self) -> BoolArray:
+        """True for points to fit, (N,): without flags, and with a BRDF if any point has one."""
         unflagged = np.array([not flags for flags in self.flags], dtype=bool)
         return unflagged & np.isfinite(self.brdf if self.has_brdf else self.radiance)
 
     @property
     def has_brdf(self) -> bool:
-        """Whether a white tile ties the radiance to a BRDF, for one point at least."""
+        """True if at least one point has a BRDF, relative to a white tile."""
         return bool(np.any(np.isfinite(self.brdf)))
 
 
 @dataclass(frozen=True, slots=True)
 class _Tile:
-    """The white tile's reading for one place of the lamp."""
+    """Reading of the white tile at one lamp setting: counts/s, relative u and flags."""
 
     rate: float
     u_relative: float
@@ -83,7 +88,7 @@ class _Tile:
 
 
 def root_sum_square(parts: Sequence[FloatArray]) -> FloatArray:
-    """Independent uncertainties (N,) taken together."""
+    """Combine independent standard uncertainties, (N,) each and in one unit."""
     total: FloatArray = np.sqrt(np.sum(np.square(parts), axis=0))
     return total
 
@@ -105,20 +110,20 @@ def reduce(readings: Sequence[Reading], protocol: Protocol, checks: Sequence[Che
     own = [tiles.get(p.lamp_setting) for p in points]
     white = np.array([np.nan if t is None else t.rate for t in own])
     return Reduced(
-        points,
-        radiance,
-        radiance / white * known,
-        _components(points),
-        (*_shared(readings, points), *_drift_noise(points, drifts)),
-        _shared_by_tile(points, own, protocol),
-        tuple(_flags(p, t, tile is not None) for p, t in zip(points, own, strict=True)),
-        tuple(drift.level for drift in drifts.values()),
-        sum(r.kind == "drift" for r in readings) + sum(check.jumped for check in checks),
+        points=points,
+        radiance=radiance,
+        brdf=radiance / white * known,
+        components=_components(points),
+        shared=(*_shared(readings, points), *_drift_noise(points, drifts)),
+        shared_by_tile=_shared_by_tile(points, own, protocol),
+        flags=tuple(_flags(p, t, tile is not None) for p, t in zip(points, own, strict=True)),
+        drift_levels=tuple(drift.level for drift in drifts.values()),
+        drift_checks=sum(r.kind == "drift" for r in readings) + sum(c.jumped for c in checks),
     )
 
 
 def _relative(points: Sequence[Reading], name: str) -> FloatArray:
-    """One of the readings' uncertainties relative to the signal; nan where that is nought."""
+    """One uncertainty of the readings relative to the signal; NaN where the signal is 0."""
     signal = np.array([p.signal_dn or np.nan for p in points])
     relative: FloatArray = np.array([getattr(p, name) for p in points]) / signal
     return relative
@@ -143,7 +148,7 @@ def _components(points: Sequence[Reading]) -> dict[str, FloatArray]:
 
 
 def _shared(readings: Sequence[Reading], points: Sequence[Reading]) -> tuple[SharedError, ...]:
-    """One dark serves an exposure; the sample is placed anew whenever the tile has been there."""
+    """Errors of the darks, one for each exposure, and of the sample's placement after each swap."""
     exposures = np.unique([p.exposure_s for p in points], return_inverse=True)[1]
     placed = {r.step: n for n, r in zip(_placements(readings), readings, strict=True)}
     placements = np.array([placed[p.step] for p in points], dtype=np.int64)
@@ -154,18 +159,18 @@ def _shared(readings: Sequence[Reading], points: Sequence[Reading]) -> tuple[Sha
 
 
 def _placements(readings: Sequence[Reading]) -> list[int]:
-    """How often sample and tile had changed places before each reading."""
+    """Number of swaps of sample and tile before each reading."""
     before = (*readings[:1], *readings)
     changes = [a.surface != b.surface for a, b in zip(readings, before, strict=False)]
     return [int(n) for n in np.cumsum(changes)]
 
 
 def _drift_noise(points: Sequence[Reading], drifts: Mapping[int, Drift]) -> tuple[SharedError, ...]:
-    """The noise of the drift checks: each is shared by the points between its neighbours.
+    """Noise of the drift checks as shared errors: each check affects the points next to it.
 
-    A point has a part of the check before it and of the one after: one of these has an even
-    number, the other an odd one, so two errors hold all of them. The third is that of its block's
-    first check, to which the levels of the whole block are referred, with the opposite sign.
+    The level at a point is interpolated between the check before it and the one after. One of the
+    two has an even number and the other an odd one, so two errors hold all of them. A third is the
+    block's first check, relative to which all levels of the block are given, with opposite sign.
     """
     if not any(drift.level.size for drift in drifts.values()):
         return ()
@@ -190,7 +195,7 @@ def _drift_noise(points: Sequence[Reading], drifts: Mapping[int, Drift]) -> tupl
 def _shared_by_tile(
     points: Sequence[Reading], tiles: Sequence[_Tile | None], protocol: Protocol
 ) -> tuple[SharedError, ...]:
-    """The tile is read once for every place of the lamp; its certificate holds for all."""
+    """Errors of the tile's reading, one for each lamp setting, and of its certificate."""
     tile = protocol.references.white_tile
     if tile is None:
         return ()

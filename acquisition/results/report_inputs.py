@@ -1,4 +1,4 @@
-"""The report of a run: everything that it shows, gathered from record, reduction and fit."""
+"""Content of a run's report, gathered from its record, reduction and fit."""
 
 from __future__ import annotations
 
@@ -22,12 +22,15 @@ Rows = tuple[tuple[str, str], ...]
 def report_data(
     reduced: Reduced,
     fitted: Fitted,
-    budget: Budget,
-    words: tuple[str, tuple[str, ...]],
     record: Record,
     loaded: Loaded,
+    *,
+    u_brdf: FloatArray,
+    budget: Budget,
+    headline: str,
+    notes: tuple[str, ...],
 ) -> ReportData:
-    """Everything that the report shows; `words` are the headline and the notes."""
+    """Return the content of the report; u_brdf (N,) in 1/sr."""
     protocol, points = loaded.protocol, reduced.points
     size, patch = protocol.sample, protocol.window
     return ReportData(
@@ -35,14 +38,14 @@ def report_data(
         sample=f"{size.name}, {size.width_mm:g} × {size.height_mm:g} mm; measured on the same "
         f"{patch.width_mm:g} × {patch.height_mm:g} mm of it at every view angle",
         description=protocol.description,
-        verdict=words[:1],
+        verdict=(headline,),
         verdict_kind=fitted.choice.verdict if fitted.choice else "",
-        notes=words[1],
+        notes=notes,
         theta_i_deg=np.array([p.theta_i_deg for p in points]),
         dphi_deg=np.array([p.dphi_deg for p in points]),
         theta_r_deg=np.array([p.theta_r_deg for p in points]),
         brdf=reduced.brdf,
-        u_brdf=fitted.u_brdf(reduced),
+        u_brdf=u_brdf,
         radiance=reduced.radiance,
         u_radiance=reduced.u_radiance,
         flags=reduced.flags,
@@ -58,7 +61,7 @@ def report_data(
 
 
 def candidates(fitted: Fitted) -> tuple[Candidate, ...]:
-    """All candidates, as the report shows them."""
+    """Return all candidates for the report."""
     if fitted.choice is None:
         return ()
     return tuple(
@@ -110,10 +113,10 @@ def _version_rows(record: Record) -> Rows:
 
 
 def _time_rows(record: Record) -> Rows:
-    words = {
+    labels = {
         "started_utc": "started (UTC)",
         "finished_utc": "finished (UTC)",
         "planned_s": "planned (s)",
         "scan_s": "took (s)",
     }
-    return tuple((text, record.meta(key) or "unknown") for key, text in words.items())
+    return tuple((text, record.meta(key) or "unknown") for key, text in labels.items())

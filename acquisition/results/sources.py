@@ -1,4 +1,4 @@
-"""What `gonio fit` can read: a run's folder, a CSV table, a folder of the CUReT database."""
+"""Sources of `gonio fit`: a run's folder, a CSV table, a folder of the CUReT database."""
 
 from __future__ import annotations
 
@@ -17,24 +17,25 @@ from analysis.data.measurements import Measurements
 from instrument.errors import InputError, NotDetermined
 from instrument.record.record import FILE_NAME, Record
 
-_LEAST_MEAN = 1e-15  # no light at all: nothing to be relative to
+_MIN_MEAN = 1e-15  # of relative values: less is no light at all
 FORMATS = ("auto", "run", "csv", "curet")
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Measurements, the rig's acceptance where it is known, and what was left out, in words."""
+    """Measurements, the rig's acceptance if it is known, and notes on points left out."""
 
     measurements: Measurements
     acceptance: Acceptance | None
     notes: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
-    """What of a source is to be fitted: `sample` of a database, angles up to `max_theta_deg`.
+    """Selection from a source.
 
-    `relative`: the values are tied to no reference. `format` is one of FORMATS.
+    format: one of FORMATS. sample: number of the material, for a database. max_theta_deg: largest
+    theta_i and theta_r. relative: the values have no absolute scale.
     """
 
     format: str = "auto"
@@ -44,13 +45,13 @@ class Wanted:
 
 
 def read_source(path: Path, wanted: Wanted) -> Source:
-    """Read what is wanted. Raises `InputError` for what is wrong, `NotDetermined` for no points."""
+    """Read a source. Raises `InputError` for wrong input, `NotDetermined` if no point is left."""
     _check(wanted)
     kind = _kind(path) if wanted.format == "auto" else wanted.format
     if (wanted.sample is not None) != (kind == "curet"):
         raise InputError(
             f"--sample: {'missing' if kind == 'curet' else wanted.sample} for the format {kind}; "
-            "it names a material of the curet format, and only there"
+            "it names a material of the curet format, and is allowed only there"
         )
     if kind == "curet":
         source = _curet(path, wanted)
@@ -58,7 +59,7 @@ def read_source(path: Path, wanted: Wanted) -> Source:
         source = _run(path) if kind == "run" else Source(read_csv(path), None, ())
         source = _cut(source, wanted.max_theta_deg)
     if wanted.relative:
-        source = replace(source, measurements=_made_relative(path, source.measurements))
+        source = replace(source, measurements=_as_relative(path, source.measurements))
     if source.measurements.size == 0:
         raise NotDetermined(f"{path}: no point is left to fit")
     return source
@@ -80,7 +81,7 @@ def _kind(path: Path) -> str:
         return "run"
     raise InputError(
         f"{path}: a folder without {FILE_NAME} is no run; name a run's folder or a CSV file, or "
-        "say --format curet --sample N for a folder of the CUReT database"
+        "add --format curet --sample N for a folder of the CUReT database"
     )
 
 
@@ -88,14 +89,14 @@ def _run(path: Path) -> Source:
     with Record.open(path) as record:
         loaded = load_run_inputs(record)
         reduced = reduced_run(record, loaded)
-    if not np.any(reduced.sound):
+    if not np.any(reduced.valid):
         raise NotDetermined(f"{path}: no geometry has been measured yet that could be fitted")
-    flagged = int(np.sum(~reduced.sound))
-    note = (f"{flagged} of {reduced.sound.size} points are flagged and not fitted",)
+    flagged = int(np.sum(~reduced.valid))
+    note = (f"{flagged} of {reduced.valid.size} points are flagged and not fitted",)
     acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
     try:
         found = measurements(reduced, loaded)
-    except ValueError as error:  # values that are no measurement, such as a u of 0
+    except ValueError as error:  # values outside their domain, such as a u of 0
         raise NotDetermined(f"{path}: {error}") from None
     return Source(found, acceptance, note if flagged else ())
 
@@ -119,10 +120,10 @@ def _cut(source: Source, max_theta_deg: float) -> Source:
     return replace(source, measurements=m.subset(inside), notes=(*source.notes, note))
 
 
-def _made_relative(path: Path, m: Measurements) -> Measurements:
-    if m.size and not np.mean(m.brdf) > _LEAST_MEAN:
+def _as_relative(path: Path, m: Measurements) -> Measurements:
+    if m.size and not np.mean(m.brdf) > _MIN_MEAN:
         raise InputError(
             f"{path}: brdf: mean {np.mean(m.brdf):g}; allowed for relative values: more than "
-            f"{_LEAST_MEAN:g}"
+            f"{_MIN_MEAN:g}"
         )
     return replace(m, relative=True)

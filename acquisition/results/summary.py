@@ -1,10 +1,10 @@
-"""What the results say in words: the headline, the notes, the uncertainty budget."""
+"""Results of a run in words: headline, parameters, notes and uncertainty budget."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from acquisition.results.fitting import Fitted, cost_of
+from acquisition.results.fitting import Fitted, u_without
 from acquisition.results.reduction import DARK, NOISE, ROUNDING, Reduced
 from analysis.fit.fit import FitResult
 from analysis.report.data import Parameter
@@ -16,25 +16,25 @@ from instrument.record.record import Record
 
 Budget = tuple[tuple[str, float, float], ...]
 
-FEW_BITS = 8
-_UNITS = {"degrees": "°", "1": ""}
+FEW_BITS = 8  # of a camera whose rounding deserves a note
+NOTABLE_PULL = 2.0  # in u
 VERDICTS = {
     "adequate": "the simplest model that explains the data within their uncertainty",
     "none adequate": "the best of the models, but none explains the data within their uncertainty",
     "not identifiable": "agrees with the data, but they do not determine all of its parameters",
 }
-NOTABLE_PULL = 2.0
+_UNITS = {"degrees": "°", "1": ""}
 
 
 def headline(fitted: Fitted) -> str:
-    """Which model was chosen and the verdict on it, in one sentence."""
+    """Return the chosen model and the verdict on it, in one sentence."""
     if fitted.choice is None or fitted.chosen is None:
         return f"No model was fitted: {fitted.reason}."
     return f"{fitted.chosen.model}: {VERDICTS[fitted.choice.verdict]}."
 
 
 def value_text(parameter: Parameter) -> str:
-    """A parameter's value with its uncertainty, or the interval that is all one can say."""
+    """Return a parameter's value with its uncertainty, or its interval if it has no u."""
     if parameter.u is not None:
         return format_value(parameter.value, parameter.u, parameter.unit)
     low, high = parameter.interval or (np.nan, np.nan)
@@ -42,7 +42,7 @@ def value_text(parameter: Parameter) -> str:
 
 
 def parameters_of(result: FitResult) -> tuple[Parameter, ...]:
-    """A candidate's parameters in the model's order."""
+    """Return a candidate's parameters in the model's order."""
     return tuple(
         Parameter(
             name=p.name,
@@ -56,12 +56,15 @@ def parameters_of(result: FitResult) -> tuple[Parameter, ...]:
 
 
 def budget(reduced: Reduced, u_brdf: FloatArray) -> Budget:
-    """Rows of (component, median relative u in %, share of the variance in %), largest first."""
+    """Return rows of (component, median relative u in %, share of the variance in %).
+
+    The largest share comes first. u_brdf (N,) in 1/sr.
+    """
     parts = {name: u**2 for name, u in reduced.parts.items()}
     known = np.isfinite(reduced.brdf)
     if known.any():
         total = (u_brdf / reduced.brdf) ** 2
-        # What the fit's total has beyond all other parts.
+        # The fit's total contains the angles, and the other parts as they are here.
         parts["angle setting"] = np.maximum(total - np.sum(list(parts.values()), axis=0), 0.0)
         parts = {name: part[known] for name, part in parts.items()}
     whole = sum(float(np.mean(p)) for p in parts.values())
@@ -73,8 +76,7 @@ def budget(reduced: Reduced, u_brdf: FloatArray) -> Budget:
 
 
 def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> tuple[str, ...]:
-    """What else the operator should know."""
-    tile = "the white tile is taken as Lambertian" if reduced.shared_by_tile else ""
+    """Return everything else that the operator should know, one sentence each."""
     found = (
         "" if loaded.rig.real else "all data are simulated",
         _unfinished_note(record),
@@ -86,20 +88,20 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         _drift_note(reduced),
         _pull_note(fitted),
         _bits_note(reduced, fitted, loaded),
-        tile,
+        "the white tile is assumed to be Lambertian" if reduced.shared_by_tile else "",
     )
     return tuple(note for note in found if note)
 
 
 def validity_note(chosen: FitResult) -> str:
-    """At how many points the fitted model is beyond what it holds for, and why."""
-    holds = chosen.validity
-    beyond = int(np.sum(~holds.mask))
-    if not beyond:
+    """Return the number of points outside the fitted model's range of validity, and the reason."""
+    valid = chosen.validity
+    outside = int(np.sum(~valid.mask))
+    if not outside:
         return ""
     return (
-        f"at {beyond} of {holds.mask.size} points the model is beyond what it holds for: "
-        f"{holds.reason}"
+        f"{outside} of {valid.mask.size} points are outside the model's range of validity: "
+        f"{valid.reason}"
     )
 
 
@@ -127,51 +129,52 @@ def _unfinished_note(record: Record) -> str:
 
 
 def _interruptions_note(record: Record) -> str:
-    """How often the scan went on after a stop, what the lamp had done, and what was tried again."""
+    """Interruptions of the scan, jumps of the lamp meanwhile, and retries."""
     kinds = [kind for _, kind, _ in record.events()]
     resumed, retries = kinds.count(RESUMED), kinds.count(RETRY)
     jumps = sum(check.jumped for check in record.checks())
     texts = (
         f"the scan was interrupted {resumed} times" if resumed else "",
-        f"the lamp had jumped at {jumps} of them, its level is counted anew there" if jumps else "",
-        f"devices were asked again {retries} times (events in the record)" if retries else "",
+        f"the lamp level had jumped after {jumps} of them and is corrected" if jumps else "",
+        f"{retries} retries of device commands, see the events in the record" if retries else "",
     )
     return "; ".join(text for text in texts if text)
 
 
 def _drift_note(reduced: Reduced) -> str:
     if not reduced.drift_checks:
-        return "no drift check was made: the lamp is taken as constant"
-    followed = [np.ptp(level) for level in reduced.drift_levels if level.size > 1]
+        return "no drift check was made: the lamp is assumed to be constant"
+    ranges = [np.ptp(level) for level in reduced.drift_levels if level.size > 1]
     unusable = reduced.drift_checks - sum(level.size for level in reduced.drift_levels)
     text = f"{unusable} of {reduced.drift_checks} drift checks are flagged or too dark to use"
-    if not followed:
-        return f"{text}: the lamp is taken as constant"
-    percent = 100 * max(followed)
-    note = f"the lamp's drift was followed and taken out: up to {percent:.2f} % at one setting"
+    if not ranges:
+        return f"{text}: the lamp is assumed to be constant"
+    note = f"lamp drift corrected: up to {100 * max(ranges):.2f} % at one lamp setting"
     return f"{note}; {text}" if unusable else note
 
 
 def _pull_note(fitted: Fitted) -> str:
-    """Shared errors that the fit puts further off than their u makes likely."""
+    """Shared errors whose fitted value is unlikely for their u."""
     pulls = fitted.chosen.pulls if fitted.chosen is not None else {}
-    far = [f"{name} by {pull:+.1f} u" for name, pull in pulls.items() if abs(pull) > NOTABLE_PULL]
-    return f"to agree with the model, the fit takes to be off: {', '.join(far)}" if far else ""
+    large = [f"{name}, {pull:+.1f} u" for name, pull in pulls.items() if abs(pull) > NOTABLE_PULL]
+    return f"large shared errors in the fit: {'; '.join(large)}" if large else ""
 
 
 def _bits_note(reduced: Reduced, fitted: Fitted, loaded: Loaded) -> str:
-    """What a camera of few bits costs: its share of u, and what the parameters lose by it."""
+    """Effect of rounding to whole counts on points and parameters, for a camera of few bits."""
     bits = loaded.rig.camera.bit_depth
     if bits > FEW_BITS or fitted.chosen is None:
         return ""
     used = fitted.used
-    rounding = np.hypot(reduced.parts[ROUNDING], reduced.parts[DARK])[used]
+    rounding = 100 * np.hypot(reduced.parts[ROUNDING], reduced.parts[DARK])[used]
+    noise = 100 * np.median(reduced.parts[NOISE][used])
     text = (
-        f"what {bits} bits cost: rounding frames and darks to whole counts gives every point a "
-        f"relative u of {100 * np.median(rounding):.2g} % (median; worst "
-        f"{100 * rounding.max():.2g} %) beside {100 * np.median(reduced.parts[NOISE][used]):.2g} "
-        "% of noise"
+        f"{bits}-bit camera: rounding frames and darks to whole counts gives each point a relative "
+        f"u of {np.median(rounding):.2g} % (median; largest {rounding.max():.2g} %), beside "
+        f"{noise:.2g} % of noise"
     )
-    cost = cost_of((ROUNDING, DARK), reduced, fitted.chosen, loaded)
-    gains = [f"u({name}) {u:.2g} instead of {now:.2g}" for name, (now, u) in cost.items()]
-    return f"{text}; without it {', '.join(gains)}" if gains else text
+    changes = [
+        f"u({name}) {without:.2g} instead of {u:.2g}"
+        for name, (u, without) in u_without((ROUNDING, DARK), fitted, reduced).items()
+    ]
+    return f"{text}; without rounding {', '.join(changes)}" if changes else text

@@ -99,7 +99,7 @@ def test_the_papers_rig_says_what_its_8_bits_cost(tmp_path: Path) -> None:
     loaded = load("foam_d", "paper_1995")
     _, fitted, remarks = measured(loaded, tmp_path / "run")
     assert_as_published("foam_d", fitted)
-    told = next(note for note in remarks if note.startswith("what 8 bits cost"))
+    told = next(note for note in remarks if note.startswith("8-bit camera"))
     now, without = re.findall(r"u\(sigma_deg\) (\S+) instead of (\S+),", told)[0][::-1]
     assert float(without) <= float(now)
 

@@ -67,7 +67,7 @@ def test_where_the_model_does_not_hold_is_told(tmp_path: Path) -> None:
     truth = {"albedo": 0.3, "sigma_deg": 20.0}
     oblique = table(tmp_path / "oblique.csv", "oren_nayar", (45.0, 86.0), **truth)
     done = gonio("fit", oblique, "--models", "oren_nayar")
-    assert re.search(r"at \d+ of \d+ points the model is beyond what it holds for", done.stdout)
+    assert re.search(r"\d+ of \d+ points are outside the model's range of validity", done.stdout)
 
 
 def test_none_adequate_is_a_result(rough: Path) -> None:
@@ -125,7 +125,7 @@ def test_mistakes_in_a_table_end_with_2_and_their_place(
     ("options", "words"),
     [
         (("--models", "phong,lambert"), "--models: unknown model 'phong'"),
-        (("--models", "lambert,lambert"), "stands twice"),
+        (("--models", "lambert,lambert"), "named twice"),
         (("--max-theta-deg", "0"), "--max-theta-deg: 0 degrees; allowed: above 0, up to 90"),
         (("--max-theta-deg", "nan"), "--max-theta-deg: nan degrees"),
         (("--format", "xml"), "--format: xml; allowed: auto, run, csv, curet"),

@@ -104,4 +104,4 @@ def test_a_scan_cut_at_any_step_can_be_reduced(full: Loaded, tmp_path: Path) -> 
     for count in range(len(readings) + 1):
         reduced = reduce(readings[:count], full.protocol, ())
         assert len(reduced.flags) == len(reduced.points)
-        assert np.all(np.isfinite(reduced.brdf[reduced.sound]))
+        assert np.all(np.isfinite(reduced.brdf[reduced.valid]))

@@ -53,4 +53,4 @@ def test_a_run_is_fitted_with_the_lamp_s_jumps_taken_out(resumed_with_a_darker_l
     source = read_source(folder, Wanted())
     with Record.open(folder) as record:
         reduced = reduced_run(record, load_run_inputs(record))
-    assert source.measurements.brdf.tolist() == reduced.brdf[reduced.sound].tolist()
+    assert source.measurements.brdf.tolist() == reduced.brdf[reduced.valid].tolist()
