@@ -4,7 +4,14 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from instrument.config.protocol import FitConfig, Protocol, Steps, WhiteTile, angles_deg
+from instrument.config.protocol import (
+    FitConfig,
+    Protocol,
+    SimulatedSample,
+    Steps,
+    WhiteTile,
+    angles_deg,
+)
 from tests.support.config.texts import PROTOCOL
 
 
@@ -35,3 +42,8 @@ def test_a_method_beside_named_models_is_refused() -> None:
 def test_the_same_schema_guards_python_callers() -> None:
     with pytest.raises(ValueError, match="at least 3 items"):
         Protocol.model_validate({**yaml.safe_load(PROTOCOL), "sweeps": [{"dphi_deg": [0.0]}]})
+
+
+def test_the_default_method_is_auto() -> None:
+    assert FitConfig().method == SimulatedSample(model="lambert", parameters={}).method == "auto"
+    assert FitConfig(method="exact").models is None
