@@ -32,7 +32,7 @@ def eon_brdf(geometry: Geometry, albedo: float, roughness: float) -> FloatArray:
     s = cos(dphi) sin_i sin_r, t = max(cos_i, cos_r) for s > 0, else 1;
     f_ms = (rho_ms/pi) (1 - E_i)(1 - E_r)/(1 - E), rho_ms = rho^2 E/(1 - rho (1 - E)), where E_i,
     E_r are the directional and E the mean albedos of f_ss at rho = 1. Written with
-    1 - E_i = A r g_i and 1 - E = A r (c1 - c2), c2 = 2/3 - 28/(15 pi), so that r = 0 is no 0/0.
+    1 - E_i = A r g_i and 1 - E = A r (c1 - c2), c2 = 2/3 - 28/(15 pi), which avoids 0/0 at r = 0.
 
     Never negative; reciprocal; Lambert's at r = 0; reflects all light at rho = 1. It grows without
     limit only where lamp and camera both graze the surface on one side.

@@ -47,12 +47,12 @@ def check(geometry: Geometry, sigma_deg: float) -> None:
 
 
 def functional(geometry: Geometry) -> float:
-    """Each time of a geometry that nothing has been kept of."""
+    """CPU seconds of an evaluation of a geometry without cached values."""
     angles = geometry.theta_i_deg, geometry.theta_r_deg, geometry.dphi_deg
     return cpu_seconds(lambda: FUNCTIONAL.brdf(Geometry(*angles), albedo=0.8, sigma_deg=20.0), 15)
 
 
-def test_a_first_evaluation_costs_at_most_that_of_two_thousand_functional_ones(
+def test_a_first_evaluation_costs_at_most_two_thousand_functional_ones(
     everywhere: Geometry,
 ) -> None:
     def first() -> None:
@@ -63,7 +63,7 @@ def test_a_first_evaluation_costs_at_most_that_of_two_thousand_functional_ones(
     check(everywhere, 20.0)
 
 
-def test_another_sigma_costs_at_most_that_of_twelve_functional_ones(everywhere: Geometry) -> None:
+def test_another_sigma_costs_at_most_twelve_functional_ones(everywhere: Geometry) -> None:
     sigmas = iter(np.linspace(5, 55, 40))
     EXACT.brdf(everywhere, albedo=0.8, sigma_deg=20.0)
 

@@ -69,7 +69,7 @@ def beckmann(sigma_h: float) -> tuple[float, FloatArray]:
     return time.process_time() - start, found
 
 
-def test_the_cost_of_beckmann_s_sum_does_not_grow_with_g() -> None:
+def test_the_cost_of_the_beckmann_sum_does_not_grow_with_g() -> None:
     """At g = 1e6 no more than twice that at g = 10, least of 20 each in turns."""
     least: dict[float, float] = {10.0: math.inf, 1e6: math.inf}
     for _ in range(20):

@@ -29,7 +29,6 @@ from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.models.base import Model, Validity
 from analysis.models.lambert import ALBEDO
@@ -37,7 +36,7 @@ from analysis.models.rough.oren_nayar_forms import SIGMA_DEG
 from analysis.models.rough.v_cavity import isotropic_single_slope
 from analysis.models.specular.torrance_sparrow import gaussian_normalisation, mean_square_slope
 from analysis.models.validity import both_graze, valid_except
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import FloatArray, Geometry, IntArray
 
 
 class Rule(NamedTuple):
@@ -119,7 +118,7 @@ class Nodes(NamedTuple):
     theta2: FloatArray
     direct: FloatArray
     twice: FloatArray
-    at: NDArray[np.intp]
+    at: IntArray
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,10 @@ import numpy as np
 from analysis.models.validity import polar
 from instrument.geometry import FloatArray, IntArray
 
+_HALF_WIDTHS, _SHARES = (0.01, 0.3), (0.5, 0.8, 1.0)  # of panels, and of the nodes they need
+_CHUNK = 8192  # nodes at a time: their arrays stay in the processor's cache
+_TINY = 1e-300  # avoids 0 / 0
+
 
 class Radiance(NamedTuple):
     """Light of one bounce per albedo / pi, and of two bounces per albedo^2 / pi."""
@@ -47,9 +51,9 @@ class Directions(NamedTuple):
 def attenuation(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> FloatArray:
     """Geometric attenuation factor (16), 0 to 1: the part of the facet that is both lit and seen.
 
-    Radians; all arguments broadcast.
     Max[0, Min[1, 2<s,n><a,n>/<s,a>, 2<v,n><a,n>/<v,a>]]: the three cases of Table 1, and 0 where
     the facet turns away from the lamp or the camera. The order of Max and Min is footnote 6's.
+    Radians; all arguments broadcast.
     """
     sa, va = _to_lamp(towards, theta_a, phi_a), _to_camera(towards, theta_a, phi_a)
     lit = _over(2 * np.cos(towards.theta_i) * np.cos(theta_a), sa)
@@ -316,20 +320,13 @@ def _hidden_twice(c: _Cavities, panels: _Panels, nodes: int) -> FloatArray:
 
 
 def _by_width(panel: IntArray, half: FloatArray, nodes: int) -> Iterator[tuple[IntArray, int]]:
-    """Panels grouped by half width (radians), and the number of nodes that each group needs.
-
-    No group has more nodes than arrays in a processor's cache hold.
-    """
+    """Panels grouped by half width (radians), and the number of nodes that each group needs."""
     size = np.searchsorted(_HALF_WIDTHS, half[panel])
     for n, share in enumerate(_SHARES):
         part, fewer = panel[size == n], max(2, round(share * nodes))
         step = _CHUNK // fewer
         for start in range(0, part.size, step):
             yield part[start : start + step], fewer
-
-
-_HALF_WIDTHS, _SHARES = (0.01, 0.3), (0.5, 0.8, 1.0)
-_CHUNK = 8192
 
 
 def _shadowed(c: _Cavities, middle: FloatArray, half: FloatArray, nodes: int) -> FloatArray:
@@ -369,9 +366,6 @@ def _across(c: _Cavities, middle: FloatArray, half: FloatArray, nodes: int) -> F
     bounces = sin_a * ((1 + U_i) / e_r + (1 + U_r) / e_i)
     value = bounces - across2 / (W + np.abs(V) + _TINY)  # ... + V - W
     return np.asarray(half * (w @ value))
-
-
-_TINY = 1e-300  # avoids 0 / 0
 
 
 def _one_minus_cos(theta: FloatArray) -> FloatArray:

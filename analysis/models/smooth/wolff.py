@@ -13,7 +13,6 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.models.base import Model, Parameter, Validity
 from analysis.models.smooth.chandrasekhar import (
@@ -30,7 +29,7 @@ from analysis.models.smooth.fresnel import (
 )
 from analysis.models.tanh_rule import W, X
 from analysis.models.validity import GRAZING, both_graze, valid_except
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import FloatArray, Geometry, IntArray
 
 SINGLE_SCATTERING_ALBEDO = Parameter(
     "single_scattering_albedo", "1", 0.0, 1.0, 0.9, starts=(0.3, 0.7, 0.95, 0.999)
@@ -187,7 +186,7 @@ def _h_and_k_gradient(mu: FloatArray, rho: float, n: float) -> tuple[FloatArray,
     return dlog_H, dK
 
 
-def _few_cosines(mu: FloatArray) -> tuple[FloatArray, NDArray[np.intp]] | None:
+def _few_cosines(mu: FloatArray) -> tuple[FloatArray, IntArray] | None:
     """Distinct cosines and the index of each `mu` among them; None where they are many."""
     if mu.size > _SEARCHED:
         return None

@@ -25,7 +25,7 @@ from instrument.geometry import FloatArray, Geometry
 F0 = Parameter("f0", "1", 0.0, 1.0, 0.04, scale=True)
 # A lobe narrower than this is a mirror image of the lamp, which no BRDF describes.
 ALPHA = Parameter("alpha", "1", 0.001, 1.0, 0.3)
-# Above 1 it is no reflectance of facets, but the strength of a forward lobe.
+# Above 1 it is the strength of a forward lobe, not a reflectance of facets.
 F90 = Parameter("f90", "1", 0.0, 10.0, 1.0, scale=True)
 
 

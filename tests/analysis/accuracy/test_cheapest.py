@@ -150,7 +150,7 @@ def test_reported_errors_and_cost_are_true() -> None:
     assert found.cost < found.cost_of_best / 10
 
 
-def test_a_tolerance_of_each_geometry_counts_for_itself() -> None:
+def test_tolerances_per_geometry_are_independent() -> None:
     """Strict where the form is accurate and loose where it is not: the form is adequate."""
     theta = np.array([10.0, 75.0])
     there = Geometry.from_degrees(theta_i=theta, theta_r=-theta)

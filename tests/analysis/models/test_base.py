@@ -147,7 +147,7 @@ def test_a_value_outside_its_domain_is_refused_by_name_and_range(name: str) -> N
 
 
 @pytest.mark.parametrize("value", ["thirty", None, [1.0, 2.0]])
-def test_a_value_that_is_no_number_is_refused_like_one_outside(value: object) -> None:
+def test_a_value_that_is_not_a_number_is_refused(value: object) -> None:
     geometry = Geometry.from_degrees(theta_i=30, theta_r=30)
     with pytest.raises(ValueError, match=r"sigma_deg = .*allowed: 0 to 60 degrees"):
         MODELS["oren_nayar"].brdf(geometry, albedo=0.5, sigma_deg=value)  # type: ignore[arg-type]  # wrong on purpose

@@ -11,7 +11,7 @@ from instrument.geometry import FloatArray
 
 
 @given(errors=st.lists(st.floats(0, 1e3), min_size=1))
-def test_levels_round_up_and_by_little(errors: list[float]) -> None:
+def test_levels_round_up_by_at_most_one_step(errors: list[float]) -> None:
     given_errors: FloatArray = np.array(errors)
     for scale in (RELATIVE, ABSOLUTE):
         stored = scale.errors(scale.levels(given_errors))

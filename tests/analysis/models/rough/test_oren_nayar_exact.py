@@ -85,7 +85,7 @@ def test_the_rules_keep_their_stated_accuracy(rule: Rule, accuracy: float) -> No
     clear_profile_cache()
 
 
-def test_the_functional_and_qualitative_forms_are_off_as_the_errata_say() -> None:
+def test_errors_of_the_printed_forms_are_those_of_the_errata() -> None:
     # errata of the papers: sigma 30 degrees, 75/60 on opposite sides and on the same side
     opposite = Geometry.from_degrees(theta_i=75, theta_r=-60)
     same = Geometry.from_degrees(theta_i=75, theta_r=60)

@@ -67,7 +67,7 @@ def test_the_qualitative_model_forward_as_in_the_errata() -> None:
     assert found == pytest.approx(0.773, abs=5e-4)
 
 
-def test_footnote_11_s_constant() -> None:
+def test_the_constant_of_footnote_11() -> None:
     # 1995, footnote 11: 0.57 for 0.33 in A partly makes up for interreflection: brighter
     geometry = random_directions(30)
     sigma2 = math.radians(30.0) ** 2

@@ -56,7 +56,7 @@ def random_cavities(count: int, seed: int) -> Iterator[tuple[float, ...]]:
         yield theta_i, theta_r, theta_a, phi_r, phi_a
 
 
-def test_the_attenuation_is_the_part_that_rays_light_and_see() -> None:
+def test_the_attenuation_is_the_part_that_rays_reach_from_lamp_and_camera() -> None:
     t = (np.arange(20000) + 0.5) / 20000
     for theta_i, theta_r, theta_a, phi_r, phi_a in random_cavities(400, 1):
         points = np.outer(t, [-math.cos(theta_a), math.sin(theta_a)])

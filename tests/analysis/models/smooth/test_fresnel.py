@@ -111,7 +111,7 @@ def test_total_internal_reflection_is_exactly_1() -> None:
 
 
 @pytest.mark.parametrize("n", [0.2, 1 / 1.5, 1 - 1e-9])
-def test_at_the_critical_angle_it_is_as_good_as_the_angle(n: float) -> None:
+def test_near_the_critical_angle_the_error_is_that_of_the_angle(n: float) -> None:
     # F starts as a square root: near it, the last digit of theta matters more than ours do.
     for off in (0.0, 1e-15, 1e-12, 1e-9, 1e-7):
         t = math.asin(n) * (1 - off)
@@ -120,7 +120,7 @@ def test_at_the_critical_angle_it_is_as_good_as_the_angle(n: float) -> None:
         assert unpolarised(t, n) == pytest.approx(either[1], rel=0, abs=allowed)
 
 
-def test_brewster_s_angle_lets_all_of_one_polarisation_through() -> None:
+def test_one_polarisation_passes_completely_at_brewsters_angle() -> None:
     para, perp = reflectances(np.arctan(1.5), 1.5)
     assert para < 1e-30
     assert perp == pytest.approx(((1 - 1.5**2) / (1 + 1.5**2)) ** 2, rel=1e-14)
@@ -142,7 +142,7 @@ def test_the_sign_of_k_does_not_matter() -> None:
 
 
 @pytest.mark.parametrize("n", [1.001, 1.3, 1.5, 3.0])
-def test_the_slope_by_n(n: float) -> None:
+def test_the_derivative_by_n(n: float) -> None:
     for t in np.radians([0.0, 20, 60, 80, 89]):
 
         def transmitted(m: mp.mpf, t: float = t) -> mp.mpf:
@@ -156,7 +156,7 @@ def test_the_slope_by_n(n: float) -> None:
 
 
 @pytest.mark.parametrize("n", [1.0, 1.001, 1.5, 3.0])
-def test_the_slope_by_the_cosine(n: float) -> None:
+def test_the_derivative_by_the_cosine(n: float) -> None:
     for t in np.radians([0.0, 20, 60, 80, 89]):
 
         def transmitted(c: mp.mpf) -> mp.mpf:
@@ -170,7 +170,7 @@ def test_the_slope_by_the_cosine(n: float) -> None:
         assert found == pytest.approx(expected, rel=1e-10, abs=1e-13)
 
 
-def test_wolff_s_polynomial_has_the_stated_error() -> None:
+def test_the_polynomial_of_wolff_has_the_stated_error() -> None:
     theta = np.radians(np.linspace(0, 90, 9001))
     error = wolff_polynomial(theta) - unpolarised(theta, 1.5)
     assert error[0] == pytest.approx(0.0254, abs=1e-4)

@@ -135,7 +135,7 @@ def reflected(theta_i: FloatArray, rho: float, n: float) -> FloatArray:
 
 
 @pytest.mark.parametrize("rho", [0.3, 0.9, 1.0])
-def test_without_an_interface_it_is_chandrasekhar_s_half_space(rho: float) -> None:
+def test_without_an_interface_it_is_the_half_space_of_chandrasekhar(rho: float) -> None:
     # exact: of the light from mu_0 the half-space returns 1 - H(mu_0) sqrt(1 - rho)
     theta = np.array([0.0, 30, 60, 80])
     expected = 1 - h_exact(np.cos(np.radians(theta)), rho) * math.sqrt(1 - rho)

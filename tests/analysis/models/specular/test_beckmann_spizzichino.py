@@ -105,7 +105,7 @@ def test_the_sums_of_the_gradient(g: float) -> None:
 
 @settings(deadline=None)
 @given(g=st.floats(1e-6, 300.0), q=st.floats(0.0, 3000.0))
-def test_the_sum_anywhere(g: float, q: float) -> None:
+def test_the_sum_at_random_arguments(g: float, q: float) -> None:
     with mp.workdps(25):
         expected = float(exact_sum(mp.mpf(g), mp.mpf(q)))
     found = float(poisson_sum(np.array(g), np.array(q), WEIGHTS["of the lobe"]))
@@ -133,7 +133,7 @@ def test_no_overflow_and_no_warning() -> None:
     assert np.all(poisson_sum(g, q, WEIGHTS["of the lobe"]) >= 0)
 
 
-def test_where_the_largest_term_lies() -> None:
+def test_position_of_the_largest_term() -> None:
     g, q = np.array([1e-3, 2.0, 50.0, 1e6]), np.array([1e4, 3.0, 0.0, 1e9])
     m = largest_term(g, q)
     np.testing.assert_allclose(m * m * np.log(m / g), q, rtol=1e-6, atol=1e-6)
@@ -176,7 +176,7 @@ PLACES = [
 @pytest.mark.parametrize(("sigma_h", "length"), [
     (1e-7, 5.0), (0.02, 3.0), (0.1, 1000.0), (0.4, 5.0), (0.7, 0.5), (5.0, 60.0), (79.6, 900.0),
 ])  # fmt: skip
-def test_the_lobe_to_a_billionth(sigma_h: float, length: float) -> None:
+def test_the_lobe_to_1e_9(sigma_h: float, length: float) -> None:
     """g up to 1e6 (sigma_h 79.6 at normal incidence), near the mirror direction and far off."""
     sides = [180.0, 180.0 - 1e-7, 175.0] if sigma_h < 5 else [179.9]
     for i, r in PLACES if sigma_h < 70 else [(0.0, 1e-3), (0.0, 1.0), (70.0, 71.0)]:
@@ -187,7 +187,7 @@ def test_the_lobe_to_a_billionth(sigma_h: float, length: float) -> None:
             assert found == pytest.approx(expected, rel=1e-9, abs=1e-280), (i, r, dphi)
 
 
-def test_the_far_wing_where_every_term_underflows_but_the_late_ones() -> None:
+def test_the_far_wing_where_only_late_terms_do_not_underflow() -> None:
     geometry = Geometry.from_degrees(theta_i=20.0, theta_r=70.0, dphi=10.0)
     for sigma_h, length in ((0.15, 20.0), (0.3, 30.0), (1.0, 30.0)):
         found = MODEL.brdf(geometry, scale=1.0, sigma_h=sigma_h, correlation_length=length)
@@ -197,7 +197,9 @@ def test_the_far_wing_where_every_term_underflows_but_the_late_ones() -> None:
 
 
 @given(theta_i=st.floats(0, 89), theta_r=st.floats(0, 89), dphi=st.floats(0, 360))
-def test_the_vectors(theta_i: float, theta_r: float, dphi: float) -> None:
+def test_the_wave_vector_and_the_half_vector_agree(
+    theta_i: float, theta_r: float, dphi: float
+) -> None:
     geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
     v_x, v_y, v_z = wave_vector(geometry)
     across2 = (2 * math.pi) ** 2 * off_mirror2(geometry)

@@ -112,7 +112,7 @@ def test_the_very_rough_surface_as_printed(i: float, r: float, p: float, sigma_h
     )
 
 
-def test_the_limits_meet_the_general_form() -> None:
+def test_the_limits_agree_with_the_general_form() -> None:
     """g = 1e-6: the first term is all; g = 632 and more: (53) for (52), to 2/g near the mirror."""
     geometry = Geometry.from_degrees(theta_i=[0.0, 30.0, 60.0], theta_r=[1.0, -31.0, -60.5])
     patch = Patch(2.0, 3.0)
@@ -149,7 +149,7 @@ def test_the_patch_of_a_pixel() -> None:
         patch_of_pixel(10.0, 20.0, 0.0, np.radians(90.0))
 
 
-def test_a_mirror_is_as_bright_at_any_incidence() -> None:
+def test_a_mirror_is_equally_bright_at_any_incidence() -> None:
     """1991, after Fig. 9: below sigma_h = 0.025 the radiance in the mirror direction is the same
     for all theta_i, as the pixel's patch grows by 1/cos while (27) has cos_i^2 / cos_r^2.
     """

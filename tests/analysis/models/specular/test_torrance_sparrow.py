@@ -146,7 +146,7 @@ def test_fresnel_by_a_function_or_by_an_array(index: complex, h: float) -> None:
     assert np.all((by_function >= 0) & (by_function <= one))
 
 
-def test_the_polarisations_add_up_and_part_at_brewster_s_angle() -> None:
+def test_polarisations_add_up_and_separate_at_brewsters_angle() -> None:
     def lobe(h: float) -> FloatArray:
         return torrance_sparrow_full(brewster, lambda t: polarised(t, 1.5, h), 10.0)
 
@@ -261,7 +261,7 @@ def test_the_formula_by_vectors(theta_i: float, theta_r: float, dphi: float, sig
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-300)
 
 
-def test_the_half_vector_s_limits() -> None:
+def test_limits_of_the_half_vector() -> None:
     geometry = Geometry.from_degrees(
         theta_i=[40, 40, 0, 90], theta_r=[40, 40, 50, 90], dphi=[180, 0, 0, 180]
     )

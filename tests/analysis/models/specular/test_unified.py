@@ -74,7 +74,7 @@ def scan(theta_i: float | FloatArray, theta_r: float | FloatArray) -> Geometry:
     return Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=180.0)
 
 
-def test_under_a_fixed_lamp_it_is_61() -> None:
+def test_with_a_fixed_lamp_it_is_equation_61() -> None:
     geometry = scan(40.0, np.linspace(30, 50, 41))
     cos_i = math.cos(math.radians(40))
     v = VALUES
@@ -90,7 +90,7 @@ def test_under_a_fixed_lamp_it_is_61() -> None:
     assert np.all(bound < 0.012 * np.max(spike))
 
 
-def test_in_a_fixed_camera_it_is_62() -> None:
+def test_with_a_fixed_camera_it_is_equation_62() -> None:
     geometry = scan(np.linspace(30, 50, 41), 40.0)
     cos_r = math.cos(math.radians(40))
     v = {**VALUES, "spike": 0.0}
@@ -158,7 +158,7 @@ def test_gradient_is_that_of_central_differences(part: float) -> None:
         )
 
 
-def test_each_component_alone() -> None:
+def test_each_component_by_itself() -> None:
     zero = {**VALUES, "diffuse": 0.0, "lobe": 0.0, "spike": 0.0}
     diffuse = MODEL.brdf(GRID, **{**zero, "diffuse": 0.7})
     np.testing.assert_allclose(diffuse, MODELS["lambert"].brdf(GRID, albedo=0.7), rtol=1e-15)
