@@ -1,9 +1,9 @@
 """Quadrature rule (tanh rule) on 0 to 1 for integrands with singular or nearly singular ends.
 
 `x = 1 / (1 + e^-s)` maps the line onto 0 to 1, and the trapezoidal rule in s converges
-exponentially. Near an end, s is linear in decades: a logarithm there, or a pole at any small distance off
-the real axis, is as smooth in s as if it were far away. With a step of 0.3 the error is about
-e^(-pi^2 / 0.3) = 5e-15 for poles on the imaginary axis through an end.
+exponentially. Near an end, s is linear in decades: a logarithm there, or a pole at any small
+distance off the real axis, is as smooth in s as if it were far away. With a step of 0.3 the error
+is about e^(-pi^2 / 0.3) = 5e-15 for poles on the imaginary axis through an end.
 """
 
 from __future__ import annotations

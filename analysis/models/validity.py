@@ -36,6 +36,11 @@ def valid_except(geometry: Geometry, *failures: tuple[BoolArray | bool, str]) ->
     return Validity(mask, "; ".join(reasons))
 
 
+def valid_unless_both_graze(geometry: Geometry, **_: float) -> Validity:
+    """Validity of a formula that diverges at grazing only. Arguments as in `Model.brdf`."""
+    return valid_except(geometry, (both_graze(geometry), GRAZING))
+
+
 def polar(name: str, angle: ArrayLike) -> FloatArray:
     """Polar angle in radians, any shape, as floats. Raises `ValueError` outside 0 to pi/2."""
     angle = np.asarray(angle, dtype=np.float64)

@@ -148,7 +148,7 @@ def _smooth_maps(parts: int = 3) -> tuple[FloatArray, FloatArray]:
 
 
 def lobe_maps(parts: int = 4) -> tuple[FloatArray, FloatArray]:
-    """Largest relative and absolute errors of the lobe's sum in each cell: (method, ln g, ln q)."""
+    """Largest relative and absolute errors of the lobe's sum, each of shape (method, g, q)."""
     g, q = (np.exp(_finer(_from_zero(axis), parts)) for axis in beckmann_lobe.GRID.values())
     g, q = np.meshgrid(g, q, indexing="ij")
     exact = poisson_sum(g, q, lambda m, *_: 1 / m)

@@ -53,7 +53,7 @@ def attenuation(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> 
 
     Max[0, Min[1, 2<s,n><a,n>/<s,a>, 2<v,n><a,n>/<v,a>]]: the three cases of Table 1, and 0 where
     the facet turns away from the lamp or the camera. The order of Max and Min is footnote 6's.
-    Radians; all arguments broadcast.
+    Angles in radians; all arguments broadcast.
     """
     sa, va = _to_lamp(towards, theta_a, phi_a), _to_camera(towards, theta_a, phi_a)
     lit = _over(2 * np.cos(towards.theta_i) * np.cos(theta_a), sa)
@@ -74,8 +74,8 @@ def critical_angle(theta: FloatArray, theta_a: FloatArray) -> FloatArray:
 def masked_width(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> FloatArray:
     """m_v / w of (20), 0 to 1: the part of the facet, from the groove up, hidden from the camera.
 
-    Radians; all arguments broadcast. Erratum: printed as "visible"; the integral (23) starts at it.
-    1 where the facet turns away.
+    Angles in radians; all arguments broadcast. Erratum: printed as "visible"; the integral (23)
+    starts at it. 1 where the facet turns away.
     """
     va, va_other = (_to_camera(towards, theta_a, phi) for phi in (phi_a, phi_a + np.pi))
     return np.where(va > 0, np.clip(-_over(va_other, va), 0.0, 1.0), 1.0)
@@ -84,8 +84,8 @@ def masked_width(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) ->
 def shadowed_width(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> FloatArray:
     """m^s / w of (21), 0 to 1: the part of the ADJACENT facet that lies in shadow.
 
-    Radians; all arguments broadcast. Erratum: printed as "illuminated". 1 where that facet turns
-    away from the lamp.
+    Angles in radians; all arguments broadcast. Erratum: printed as "illuminated". 1 where that
+    facet turns away from the lamp.
     """
     sa, sa_other = (_to_lamp(towards, theta_a, phi) for phi in (phi_a, phi_a + np.pi))
     return np.where(sa_other > 0, np.clip(-_over(sa, sa_other), 0.0, 1.0), 1.0)
@@ -110,7 +110,7 @@ def interreflection_factor(
 def projected_radiance(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> Radiance:
     """Projected radiance of one facet: (10) times (16), Table 1; and (26). Sum: (27).
 
-    Radians; all arguments broadcast. The parts are in the unit of the module.
+    Angles in radians; all arguments broadcast.
     """
     sa, sa_other = (_to_lamp(towards, theta_a, phi) for phi in (phi_a, phi_a + np.pi))
     va = _to_camera(towards, theta_a, phi_a)
@@ -128,7 +128,7 @@ def unidirectional_single_slope(
 ) -> Radiance:
     """Radiance of grooves of one slope and one azimuth: (28), the mean of their two facets.
 
-    Radians; all arguments broadcast. The parts are in the unit of the module.
+    Angles in radians; all arguments broadcast.
     """
     one = projected_radiance(towards, theta_a, phi_a)
     other = projected_radiance(towards, theta_a, phi_a + np.pi)

@@ -19,7 +19,7 @@ import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity, cached_per_geometry
 from analysis.models.specular.torrance_sparrow import off_mirror2
-from analysis.models.validity import GRAZING, both_graze, valid_except
+from analysis.models.validity import GRAZING, both_graze, valid_except, valid_unless_both_graze
 from instrument.geometry import FloatArray, Geometry
 
 F0 = Parameter("f0", "1", 0.0, 1.0, 0.04, scale=True)
@@ -39,9 +39,7 @@ def ggx_brdf(geometry: Geometry, f0: float, alpha: float) -> FloatArray:
     (for small alpha). One bounce only: reflects less than it receives. Never negative;
     reciprocal. It grows without limit only where lamp and camera both graze the surface.
     """
-    _, cos_half, D, visibility = _factors(geometry, alpha)
-    F = f0 + (1 - f0) * np.power(1 - cos_half, 5)
-    return np.asarray(F * D * visibility)
+    return ggx_f90_brdf(geometry, f0, 1.0, alpha)
 
 
 def ggx_gradient(geometry: Geometry, f0: float, alpha: float) -> dict[str, FloatArray]:
@@ -96,12 +94,6 @@ def ggx_f90_validity(geometry: Geometry, f0: float, f90: float, alpha: float) ->
     )
 
 
-def ggx_validity(geometry: Geometry, f0: float, alpha: float) -> Validity:
-    """Valid unless lamp and camera both graze the surface. Arguments as in `Model.brdf`."""
-    del f0, alpha  # validity does not depend on them
-    return valid_except(geometry, (both_graze(geometry), GRAZING))
-
-
 def _factors(
     geometry: Geometry, alpha: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -127,5 +119,5 @@ def _q(theta: FloatArray, alpha: float) -> FloatArray:
     return np.asarray(np.sqrt(np.square(np.cos(theta)) + np.square(alpha * np.sin(theta))))
 
 
-GGX = Model("ggx", (F0, ALPHA), ggx_brdf, ggx_gradient, ggx_validity)
+GGX = Model("ggx", (F0, ALPHA), ggx_brdf, ggx_gradient, valid_unless_both_graze)
 GGX_F90 = Model("ggx_f90", (F0, F90, ALPHA), ggx_f90_brdf, ggx_f90_gradient, ggx_f90_validity)

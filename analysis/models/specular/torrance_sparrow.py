@@ -20,8 +20,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity, cached_per_geometry
-from analysis.models.validity import GRAZING, both_graze, valid_except
+from analysis.models.base import Model, Parameter, cached_per_geometry
+from analysis.models.validity import valid_unless_both_graze
 from instrument.geometry import FloatArray, Geometry
 
 KS = Parameter("ks", "1", 0.0, 10.0, 0.1, scale=True)
@@ -75,11 +75,6 @@ def torrance_sparrow_lobe_gradient(
     """Derivatives of `torrance_sparrow_lobe_brdf`. As in `Model.gradient`."""
     by = torrance_sparrow_gradient(geometry, ks, lobe_sigma_deg)
     return {"ks": by["ks"], "lobe_sigma_deg": by["sigma_deg"]}
-
-
-def torrance_sparrow_validity(geometry: Geometry, **_: float) -> Validity:
-    """Valid unless lamp and camera both graze: P / cos diverges. Arguments as in `Model.brdf`."""
-    return valid_except(geometry, (both_graze(geometry), GRAZING))
 
 
 def torrance_sparrow_full(
@@ -201,12 +196,12 @@ TORRANCE_SPARROW = Model(
     (KS, SIGMA_DEG),
     torrance_sparrow_brdf,
     torrance_sparrow_gradient,
-    torrance_sparrow_validity,
+    valid_unless_both_graze,
 )
 TORRANCE_SPARROW_LOBE = Model(
     "torrance_sparrow_lobe",
     (KS, LOBE_SIGMA_DEG),
     torrance_sparrow_lobe_brdf,
     torrance_sparrow_lobe_gradient,
-    torrance_sparrow_validity,
+    valid_unless_both_graze,
 )
