@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 
 from acquisition.engine.axis import Axis
 from acquisition.engine.exposer import Exposed, Exposer
@@ -64,9 +65,8 @@ class Engine:
         self._record, self._on_step = record, on_step
         self._pinhole = Pinhole.of(rig)
         self._ended = False
-        self._positioner = Positioner(
-            rig, devices.axes, devices.lamp, devices.operator, self._note_operator
-        )
+        note = partial(self._add_event, OPERATOR)
+        self._positioner = Positioner(rig, devices.axes, devices.lamp, devices.operator, note)
         camera = RetryingCamera(devices.camera)
         self._exposer = Exposer(camera, devices.lamp, devices.clock, protocol, rig, record)
 
@@ -194,29 +194,20 @@ class Engine:
         if exposed is None:
             return
         step, reading = exposed.step, self._measure(exposed)
-        preview = None
+        preview, files = None, list[str]()
         if step.preview:
             preview = make_preview(exposed, self._window(step), self._rig.camera.max_dn)
-        keep = self._protocol.keep_frames
-        files = write_frames(exposed.frames, step.index, self._record.folder) if keep else ()
+        if self._protocol.keep_frames:
+            files = write_frames(exposed.frames, step.index, self._record.folder)
         self._record.add_reading(reading, preview, exposed.frames, files)
         self._exposer.note_brightness(reading)
         self._on_step(step)
 
     def _measure(self, exposed: Exposed) -> Reading:
-        window = self._window(exposed.step)
-        signal = measure(
-            exposed.frames,
-            exposed.dark,
-            window,
-            self._rig.camera,
-            self._rig.u_placement_mm,
-            self._protocol.window.min_pixels,
-        )
+        window, least = self._window(exposed.step), self._protocol.window.min_pixels
+        camera, u_placement_mm = self._rig.camera, self._rig.u_placement_mm
+        signal = measure(exposed.frames, exposed.dark, window, camera, u_placement_mm, least)
         return _reading(exposed, window, signal)
-
-    def _note_operator(self, text: str) -> None:
-        self._add_event(OPERATOR, text)
 
     def _add_event(self, kind: str, text: str) -> None:
         self._record.add_event(self._devices.clock.utc().isoformat(), kind, text)

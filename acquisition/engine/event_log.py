@@ -7,10 +7,10 @@ thread writes them.
 from __future__ import annotations
 
 import logging
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
-from queue import Empty, SimpleQueue
 
 from instrument.record.event_kinds import RETRY, TROUBLE
 from instrument.record.record import Record
@@ -28,21 +28,18 @@ class EventLogHandler(logging.Handler):
         super().__init__(logging.WARNING)
         self._record = record
         self.troubles: list[str] = []
-        self._queue: SimpleQueue[logging.LogRecord] = SimpleQueue()
+        self._queue: deque[logging.LogRecord] = deque()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Queue a message, from any thread."""
         if record.levelno >= logging.ERROR:
             self.troubles.append(record.getMessage())
-        self._queue.put(record)
+        self._queue.append(record)
 
     def write(self) -> None:
         """Write the queued messages to the record, in order; raise `StorageError`."""
-        while True:
-            try:
-                message = self._queue.get_nowait()
-            except Empty:
-                return
+        while self._queue:
+            message = self._queue.popleft()
             time_utc = datetime.fromtimestamp(message.created, UTC).isoformat()
             kind = RETRY if message.levelno < logging.ERROR else TROUBLE
             self._record.add_event(time_utc, kind, message.getMessage())

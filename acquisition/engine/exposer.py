@@ -24,7 +24,7 @@ from instrument.record.record import Record
 MAX_EXPOSURES_TRIED = 8  # spans the ladder of any camera in factors of four
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Exposed:
     """Frames of a step with their dark, ready to be reduced.
 
@@ -74,16 +74,9 @@ class Exposer:
         frames = [first]
         if step.frames > 1:
             frames += self.camera.grab(step.frames - 1)
-        time_s, time_utc = self._scan_s(), self.clock.utc().isoformat()
+        time_s, utc = round(self._scan_s(), 3), self.clock.utc().isoformat()
         dark = self._dark(first.exposure_s)
-        return Exposed(
-            step=step,
-            frames=frames,
-            dark=dark,
-            time_s=round(time_s, 3),
-            free_s=self._scan_s(),
-            time_utc=time_utc,
-        )
+        return Exposed(step, frames, dark, time_s=time_s, free_s=self._scan_s(), time_utc=utc)
 
     def _scan_s(self) -> float:
         return self.clock.now_s() - self._start_s
@@ -105,7 +98,7 @@ class Exposer:
         last = self._last.get(step.surface)
         if last is None or math.isnan(last.peak_dn):
             return step.expected_exposure_s
-        return self._within_target_s(self._rate(last.peak_dn, last.exposure_s))
+        return self._exposure_s(last.peak_dn, last.exposure_s)
 
     def _suitable_s(self, frame: Frame, window: Window) -> float:
         """Return the exposure that suits the brightness of a frame."""
@@ -115,15 +108,12 @@ class Exposer:
         camera, peak = self.rig.camera, bright_level(counted)
         if peak >= SATURATION_FRACTION * camera.max_dn:  # the true brightness is unknown
             return longest_exposure_s(frame.exposure_s / 4, camera)
-        return self._within_target_s(self._rate(peak, frame.exposure_s))
+        return self._exposure_s(peak, frame.exposure_s)
 
-    def _rate(self, peak_dn: float, exposure_s: float) -> float:
-        """Return the counts per second of the brightest part."""
-        return max(peak_dn - self.rig.camera.black_level_dn, 0.5) / exposure_s
-
-    def _within_target_s(self, rate_dn_per_s: float) -> float:
-        """Return the longest exposure of the ladder within the protocol's exposure target."""
+    def _exposure_s(self, peak_dn: float, exposure_s: float) -> float:
+        """Return the exposure within the target, given the peak level seen at another exposure."""
         camera = self.rig.camera
+        rate_dn_per_s = max(peak_dn - camera.black_level_dn, 0.5) / exposure_s
         target = self.protocol.exposure_target * (camera.max_dn - camera.black_level_dn)
         return longest_exposure_s(target / rate_dn_per_s, camera)
 

@@ -15,14 +15,14 @@ from instrument.text.atomic_file import explain_os_error, make_folder, write_who
 FOLDER = "frames"
 
 
-def write_frames(frames: Sequence[Frame], step: int, run: Path) -> tuple[str, ...]:
+def write_frames(frames: Sequence[Frame], step: int, run: Path) -> list[str]:
     """Write raw counts as TIFF into the run's folder; return the names relative to it.
 
     Raises `StorageError` if a file cannot be written.
     """
     import cv2
 
-    names = tuple(f"{FOLDER}/{step:06d}-{number:04d}.tiff" for number in range(len(frames)))
+    names = [f"{FOLDER}/{step:06d}-{number:04d}.tiff" for number in range(len(frames))]
     try:
         make_folder(run / FOLDER)
         for name, frame in zip(names, frames, strict=True):

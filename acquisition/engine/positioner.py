@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Callable, Mapping
 
 from acquisition.engine.axis import Axis
@@ -48,16 +47,12 @@ class Positioner:
         """Determine the pose after an interruption: stop all axes, home those that need it."""
         for axis in self._axes.values():
             axis.stop()
-        angles = {}
-        home = home_pose(self._rig)
+        angles = home_pose(self._rig)._asdict()  # nan for an axis set by hand
         for name, axis in self._axes.items():
-            if axis.by_hand:
-                angles[name] = math.nan
-            elif axis.homed():
+            if not axis.by_hand and axis.homed():
                 angles[name] = axis.position_deg()
-            else:
+            elif not axis.by_hand:
                 axis.home()
-                angles[name] = getattr(home, name)
         self.pose = Pose(**angles)
 
     def move_to(self, pose: Pose) -> None:
@@ -68,10 +63,9 @@ class Positioner:
     def start_moves(self, moves: tuple[Move, ...], target: Pose) -> None:
         """Start the first of the moves to a pose, if it is a motor's, and return."""
         self._moves, self._target = moves, target
-        first = moves[0] if moves else None
-        self._started = first is not None and not self._axes[first.axis].by_hand
-        if first is not None and self._started:
-            self._axes[first.axis].start_move(first.angle_deg)
+        self._started = bool(moves) and not self._axes[moves[0].axis].by_hand
+        if self._started:
+            self._axes[moves[0].axis].start_move(moves[0].angle_deg)
 
     def finish_moves(self) -> None:
         """Make the moves one after the other, then let the axes settle."""

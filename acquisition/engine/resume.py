@@ -40,10 +40,8 @@ class Progress:
 
     def drift_step(self, plan: Plan, block: int) -> Step | None:
         """Return the step of the block's last usable drift check, or None without one."""
-        usable = [
-            r.step for r in self.readings if r.kind == "drift" and r.block == block and is_usable(r)
-        ]
-        return plan.steps[usable[-1]] if usable else None
+        checks = (r for r in reversed(self.readings) if r.kind == "drift" and r.block == block)
+        return next((plan.steps[r.step] for r in checks if is_usable(r)), None)
 
     def last_step(self, plan: Plan, block: int) -> Step | None:
         """Return the last accepted step if it belongs to the block, else None."""
@@ -59,12 +57,9 @@ class Progress:
         deviation = abs(rate(repeated) - expected)
         jumped = is_usable(repeated) and deviation > max(JUMP_U * u, MIN_JUMP * expected)
         return Check(
-            before_step=next_step.index,
-            expected=expected,
-            u_expected=u,
-            jumped=jumped,
+            before_step=next_step.index, expected=expected, u_expected=u, jumped=jumped,
             reading=repeated,
-        )
+        )  # fmt: skip
 
 
 def check_text(check: Check) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import chain, permutations
 
 from acquisition.plan.keep_out import enters_zone
 from acquisition.plan.pose import Pose
@@ -47,17 +47,13 @@ def moves_between(start: Pose, end: Pose, rig: Rig) -> tuple[Move, ...]:
     changed.sort(key=lambda name: not isinstance(rig.axes[name], HandAxis))
     first_obstacle: tuple[str, str] | None = None
     for order in permutations(changed):
-        moves = tuple(_moves(start, end, order, rig))
+        legs = (axis_moves(name, getattr(start, name), getattr(end, name), rig) for name in order)
+        moves = tuple(chain.from_iterable(legs))
         obstacle = _obstacle(start, moves, rig)
         if obstacle is None:
             return moves
         first_obstacle = first_obstacle or obstacle
     raise NoPathError(f"from {start} to {end}", *(first_obstacle or ("", "")))
-
-
-def _moves(start: Pose, end: Pose, order: tuple[str, ...], rig: Rig) -> Iterator[Move]:
-    for name in order:
-        yield from axis_moves(name, getattr(start, name), getattr(end, name), rig)
 
 
 def axis_moves(name: str, start_deg: float, end_deg: float, rig: Rig) -> Iterator[Move]:

@@ -23,6 +23,8 @@ from instrument.errors import InputError
 from instrument.geometry import cone_half_angle_deg
 from instrument.record.reading import Kind
 
+Target = tuple[Kind, Pose]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
@@ -140,34 +142,31 @@ def _ordered_steps(poses: Sequence[Pose], protocol: Protocol, rig: Rig) -> list[
     for block, group in enumerate(blocks.values()):
         sample, tile = _block(group, protocol)
         for kind, pose in [*tile, *sample] if block % 2 == 0 else [*sample, *tile]:
-            key = (block, pose.theta_i, pose.dphi)
-            setting = numbers.setdefault(key, len(numbers))
+            setting = numbers.setdefault((block, pose.theta_i, pose.dphi), len(numbers))
             steps.append(_step(len(steps), kind, pose, setting, block, protocol, rig))
     return steps
 
 
-def _block(
-    poses: list[Pose], protocol: Protocol
-) -> tuple[list[tuple[Kind, Pose]], list[tuple[Kind, Pose]]]:
-    """Return the steps on the sample and those on the tile for one setting by hand."""
+def _block(poses: list[Pose], protocol: Protocol) -> tuple[list[Target], list[Target]]:
+    """Return the targets on the sample and those on the tile for one setting by hand."""
     tile, drift = protocol.references.white_tile, protocol.references.drift_check
-    sample: list[tuple[Kind, Pose]] = [("point", pose) for pose in poses]
+    sample: list[Target] = [("point", pose) for pose in poses]
     if drift is not None:
-        check: tuple[Kind, Pose] = ("drift", poses[0]._replace(theta_r=drift.theta_r_deg))
+        check: Target = ("drift", poses[0]._replace(theta_r=drift.theta_r_deg))
         starts = range(0, len(poses), drift.every_points)
         sample = [s for n in starts for s in (check, *sample[n : n + drift.every_points])]
         sample.append(check)
-    references: list[tuple[Kind, Pose]] = []
-    if tile is not None:
-        settings = dict.fromkeys((pose.theta_i, pose.dphi) for pose in poses)
-        references = [("tile", Pose(*setting, tile.theta_r_deg)) for setting in settings]
-    return sample, references
+    if tile is None:
+        return sample, []
+    settings = dict.fromkeys((pose.theta_i, pose.dphi) for pose in poses)
+    return sample, [("tile", Pose(*setting, tile.theta_r_deg)) for setting in settings]
 
 
 def _step(
     index: int, kind: Kind, pose: Pose, setting: int, block: int, protocol: Protocol, rig: Rig
 ) -> Step:
     tile = protocol.references.white_tile if kind == "tile" else None
+    reflectance = 0.5 if tile is None else 1.0  # the sample's is not known yet
     return Step(
         index=index,
         kind=kind,
@@ -176,9 +175,7 @@ def _step(
         lamp_setting=setting,
         block=block,
         frames=protocol.frames_per_point if tile is None else tile.frames,
-        expected_exposure_s=expected_exposure_s(
-            pose.theta_i, 0.5 if tile is None else 1.0, protocol, rig
-        ),
+        expected_exposure_s=expected_exposure_s(pose.theta_i, reflectance, protocol, rig),
     )
 
 
