@@ -229,9 +229,9 @@ def bench(
 ) -> None:
     """Measure and chart speed against accuracy, for each method, on this machine."""
     with errors_as_exit_codes():
-        from acquisition.benchmark.command import run_bench
+        from acquisition.benchmark.command import run_benchmark
 
-        run_bench(out, quick, maps)
+        run_benchmark(out, quick, maps)
 
 
 def main() -> None:

@@ -1,5 +1,6 @@
-"""`gonio bench`: what accuracy costs, measured on the machine it runs on.
+"""Benchmark of speed against accuracy, `gonio bench`, on the machine that it runs on.
 
-What to use when: `trial` and `study` for what is measured, `studies` for all of it, `page` and
-`files` for what is left behind. Every study sets cost against the error to an independent truth.
+Open `command` first: it measures the `studies`, draws the `maps` and writes the `output`. A study
+compares methods in scenes; each trial sets a method's cost against its error to an independent
+truth. `demo_scan` derives the simulated scans from the shipped demonstration.
 """

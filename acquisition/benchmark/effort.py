@@ -1,18 +1,18 @@
-"""How much is measured: the whole of it, or a quick form that asks the same questions."""
+"""Effort of a benchmark: the whole one, or a quick one that answers the same questions."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
-    """Counts of each study.
+    """Sample sizes of the studies.
 
-    truths: geometries of which the true reflectance is worked out. batch: geometries at once.
-    repeats: of what is timed. frame_views: view angles of the window. starts: of a fit, over
+    truths: geometries with a reference value of the reflectance. batch: geometries in one call.
+    repeats: of each timing. frame_views: view angles of the window. starts: of a fit, over
     `data_sets` noisy scans. seeds: simulated scans of each setting. draws: of a noisy reading.
-    thorough: all settings of the scan, or the decisive ones.
+    thorough: all settings of the scan, not only the decisive ones.
     """
 
     name: str
@@ -27,5 +27,11 @@ class Effort:
     thorough: bool
 
 
-WHOLE = Effort("whole", 40, 8192, 9, 11, 1000, 10, 12, 200, True)
-QUICK = Effort("quick", 6, 4096, 3, 5, 9, 3, 2, 40, False)
+WHOLE = Effort(
+    name="whole", truths=40, batch=8192, repeats=9, frame_views=11, starts=1000, data_sets=10,
+    seeds=12, draws=200, thorough=True,
+)  # fmt: skip
+QUICK = Effort(
+    name="quick", truths=6, batch=4096, repeats=3, frame_views=5, starts=9, data_sets=3,
+    seeds=2, draws=40, thorough=False,
+)  # fmt: skip

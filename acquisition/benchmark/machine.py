@@ -1,4 +1,4 @@
-"""The machine that a bench ran on, and the versions of what it ran with."""
+"""Processor, operating system and library versions of the machine that a benchmark ran on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from acquisition.results.versions import LIBRARIES, versions_of
 
 
 def machine() -> dict[str, str]:
-    """Processor, cores, operating system, versions and date, by name."""
+    """Return processor, cores, operating system, versions and date, by name."""
     found = {
         "processor": _processor(),
         "cores": str(os.cpu_count() or "unknown"),
@@ -23,7 +23,7 @@ def machine() -> dict[str, str]:
 
 
 def _processor() -> str:
-    """Its name as Linux tells it, or what Python knows."""
+    """Return the processor's name from Linux, or else from Python."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:

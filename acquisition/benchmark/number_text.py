@@ -1,4 +1,4 @@
-"""Numbers as charts and captions write them."""
+"""Numbers as text for charts and captions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ _POWERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def short(value: float) -> str:
-    """One digit where a power of ten is needed, plain from a hundredth to some thousands."""
+    """Format as a plain number from 0.01 to 5000, otherwise as one digit and a power of ten."""
     if value == 0 or 0.009 < value < 5001:
         return rounded(value)
     exponent = math.floor(math.log10(value) + 1e-9)
@@ -20,12 +20,12 @@ def short(value: float) -> str:
 
 
 def rounded(value: float) -> str:
-    """Two significant digits without an exponent; whole numbers of more digits as they are."""
+    """Format with two significant digits and no exponent; integers from 100 on in full."""
     if value >= 100:
         return f"{value:.0f}"
     return f"{float(f'{value:.2g}'):g}"
 
 
 def percent(part: float) -> str:
-    """A part as a percentage of two significant digits."""
+    """Format a fraction as a percentage of two significant digits."""
     return f"{rounded(100 * part)} %"

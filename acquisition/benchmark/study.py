@@ -1,20 +1,20 @@
-"""One question put to several methods, in one or several scenes, and its answer in trials."""
+"""Study: one question put to several methods in one or more scenes, answered by trials."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from acquisition.benchmark.trial import Trial
+from acquisition.benchmark.trial import Trial, select
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Study:
-    """Trials with what their chart says.
+    """Trials with the texts of their chart.
 
-    name: of its files, lower case. cost_axis, error_axis: with the unit, as on the chart.
-    caption: two lines on what to read off the chart. truth: what the errors are errors of.
-    error_is: what `Trial.error` is, in a word ("worst", "rms"). joined: the trials of a series are
-    steps of one quantity: the chart joins them by a line and names only the default.
+    name: stem of its files, lower case. cost_axis, error_axis: axis labels with the unit.
+    caption: two lines on what the chart shows. truth: reference of the errors.
+    error_is: meaning of `Trial.error` in a word ("worst", "rms"). joined: the trials of a series
+    are steps of one quantity; the chart joins them by a line and labels only the default.
     """
 
     name: str
@@ -39,22 +39,22 @@ class Study:
 
     @property
     def scenes(self) -> tuple[str, ...]:
-        """The scenes in order."""
+        """Names of the scenes, in order of appearance."""
         return tuple(dict.fromkeys(trial.scene for trial in self.trials))
 
     @property
     def series(self) -> tuple[str, ...]:
-        """The series in order."""
+        """Names of the series, in order of appearance."""
         return tuple(dict.fromkeys(trial.series for trial in self.trials))
 
-    def of(self, scene: str) -> tuple[Trial, ...]:
-        """The trials of one scene."""
-        return tuple(trial for trial in self.trials if trial.scene == scene)
+    def in_scene(self, scene: str) -> list[Trial]:
+        """Return the trials of one scene."""
+        return select(self.trials, scene=scene)
 
-    def named(self, scene: str, label: str) -> Trial:
-        """One trial. Raises `KeyError` that lists the labels of the scene."""
-        for trial in self.of(scene):
-            if trial.label == label:
-                return trial
-        known = ", ".join(trial.label for trial in self.of(scene))
+    def trial(self, scene: str, label: str) -> Trial:
+        """Return one trial. Raises `KeyError` that lists the labels of the scene."""
+        own = self.in_scene(scene)
+        for trial in select(own, label=label):
+            return trial
+        known = ", ".join(trial.label for trial in own)
         raise KeyError(f"{self.name}: no {label!r} in {scene!r}; there are: {known or 'none'}")

@@ -1,4 +1,4 @@
-"""How long something takes; what was timed is handed back, so that it can be checked."""
+"""CPU time of a call, together with the value that it returned, so that both can be checked."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from typing import Generic, NamedTuple, TypeVar
 Value = TypeVar("Value")
 
 _TICK_S = 1e-9  # of the clock
-_RUN_S = 2e-3  # what is timed takes at least this long
-_LONG_S = 1.0  # from here on twice is enough
+_RUN_S = 2e-3  # least duration of one timing
+_LONG_S = 1.0  # total after which two timings are enough
 
 
 class Timed(NamedTuple, Generic[Value]):
-    """CPU seconds of one call: the least and the median; and what the last call returned.
+    """Least and median CPU seconds of one call, and the value of the last call.
 
-    What else runs on the machine only adds to a time, so that the least one is nearest to the
-    truth; `spread` says how far the typical one lies above it, as a part.
+    Other load on the machine only adds to a time, so the least one is nearest to the truth.
     """
 
     least_s: float
@@ -27,17 +26,17 @@ class Timed(NamedTuple, Generic[Value]):
 
     @property
     def spread(self) -> float:
-        """Median over least, less 1."""
+        """Median over least time, minus 1."""
         return self.median_s / self.least_s - 1
 
 
 def timed(
     action: Callable[[], Value], repeats: int, before: Callable[[], object] | None = None
 ) -> Timed[Value]:
-    """Time a call `repeats` times (3 or more), a long one twice; `before` goes first, untimed.
+    """Time a call `repeats` times (3 or more), a long one twice; `before` runs first, untimed.
 
-    The first call, with its imports and new memory, is not counted. A call too short for the clock
-    is run several times in a row, unless something has to go before each. Raises `ValueError` for
+    The first call, with its imports and new memory, does not count. A call too short for the clock
+    is run several times in a row, unless `before` has to precede each. Raises `ValueError` for
     fewer repeats.
     """
     if repeats < 3:
@@ -56,7 +55,7 @@ def timed(
 def _once(
     action: Callable[[], Value], before: Callable[[], object] | None, in_a_row: int = 1
 ) -> tuple[Value, float]:
-    """What the last of some calls in a row gave, and the CPU seconds of all."""
+    """Return the value of the last of some calls in a row, and the CPU seconds of all."""
     if before is not None:
         before()
     begun_s = time.process_time()

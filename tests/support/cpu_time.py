@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 
@@ -14,3 +15,12 @@ def cpu_seconds(action: Callable[[], object], repeats: int) -> float:
         action()
         times.append(time.process_time() - start)
     return min(times)
+
+
+def cpu_ratio(one: Callable[[], object], other: Callable[[], object], repeats: int) -> float:
+    """Least CPU time of one call over that of another, the two called in turn."""
+    least = [math.inf, math.inf]
+    for _ in range(repeats):
+        for n, action in enumerate((one, other)):
+            least[n] = min(least[n], cpu_seconds(action, 1))
+    return least[0] / least[1]

@@ -1,6 +1,6 @@
-"""How maps look: regions in greys with a contour at each level, and why in each region.
+"""Look of the maps: grey regions with a contour at each level, and the reason in each region.
 
-All is told by grey, line and word, so that it reads the same in black and white.
+Greys, lines and words only, so that a map reads the same in black and white.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from acquisition.benchmark.output.axes_grid import axes_grid
 from analysis.report.style import INK
 from instrument.geometry import BoolArray, FloatArray
 
@@ -31,18 +32,8 @@ _LEAST_SIDE = 0.11  # of a panel: a region narrower than this has no room for wo
 
 
 @dataclass(frozen=True, slots=True)
-class MapPicture:
-    """A map: what it shows, what to read off it, the picture, and its numbers by column."""
-
-    title: str
-    caption: str
-    svg: str
-    columns: Mapping[str, list[float | str]]
-
-
-@dataclass(frozen=True, slots=True)
 class Reason:
-    """Why it is so where values are above `level`, between two values of x."""
+    """Text for the region where values exceed `level`, between two values of x."""
 
     words: str
     level: float
@@ -50,14 +41,51 @@ class Reason:
     to_x: float = np.inf
 
 
-def contours(
-    ax: Axes,
-    x: FloatArray,
-    y: FloatArray,
-    values: FloatArray,
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One set of axes: `values` of shape (y, x) over the axes' coordinates, and the reasons."""
+
+    title: str
+    x: FloatArray
+    y: FloatArray
+    values: FloatArray
+    reasons: Sequence[Reason]
+
+
+def draw_panels(
+    figure: Figure,
+    rows: int,
+    panels: Sequence[Panel],
+    *,
     levels: Sequence[float] = PERCENT,
-) -> None:
-    """Regions of `values` (y, x) between levels, lighter where they are lower, and their edges."""
+    unit: str = " %",
+    wspace: float = 0.08,
+    share: bool = True,
+) -> list[Axes]:
+    """Draw panels row by row, with the legend of their levels above; return their axes."""
+    axes = axes_grid(
+        figure, rows, len(panels) // rows, top_in=0.62, left=0.07, wspace=wspace,
+        share_x=share, share_y=share,
+    )  # fmt: skip
+    for ax, panel in zip(axes, panels, strict=True):
+        _contours(ax, panel, levels)
+        _write_reasons(ax, panel)
+        ax.set_title(panel.title, color=INK, loc="left", pad=4)
+    _level_legend(figure, levels, unit)
+    return axes
+
+
+def label_axes(axes: Sequence[Axes], columns: int, x: str, y: str) -> None:
+    """Label x below the last row and y left of the first column."""
+    for ax in axes[-columns:]:
+        ax.set_xlabel(x, fontsize=9.5)
+    for ax in axes[::columns]:
+        ax.set_ylabel(y)
+
+
+def _contours(ax: Axes, panel: Panel, levels: Sequence[float]) -> None:
+    """Fill the regions between levels, lighter where values are lower, and draw their edges."""
+    x, y, values = panel.x, panel.y, panel.values
     top = 2 * max(float(np.max(values[np.isfinite(values)], initial=0.0)), levels[-1])
     shown = np.clip(np.where(np.isfinite(values), values, top), levels[0] * 1e-3, top)
     edges = [levels[0] * 1e-4, *levels, 2 * top]
@@ -72,13 +100,12 @@ def contours(
     ax.set_ylim(y[0], y[-1])
 
 
-def say_why(
-    ax: Axes, x: FloatArray, y: FloatArray, values: FloatArray, reasons: Sequence[Reason]
-) -> None:
+def _write_reasons(ax: Axes, panel: Panel) -> None:
     """Write each reason into the middle of its region, where there is room."""
+    x, y = panel.x, panel.y
     written: list[tuple[float, float]] = []
-    for reason in reasons:
-        region = ~(values <= reason.level) & (x >= reason.from_x) & (x <= reason.to_x)
+    for reason in panel.reasons:
+        region = ~(panel.values <= reason.level) & (x >= reason.from_x) & (x <= reason.to_x)
         place = _roomiest(region)
         if place is None:
             continue
@@ -92,7 +119,7 @@ def say_why(
 
 
 def _write(ax: Axes, across: float, up: float, width: float, words: str) -> None:
-    """Words about a place of the panel, in lines that take `width` of it, and all inside it."""
+    """Write words around a place of the panel, in lines `width` of it wide, all inside it."""
     box = ax.get_window_extent()
     columns, rows = box.width / 72 / _LETTER_IN[0], box.height / 72 / _LETTER_IN[1]
     lines = textwrap.wrap(words, max(11, int(columns * width)))
@@ -107,7 +134,7 @@ def _write(ax: Axes, across: float, up: float, width: float, words: str) -> None
 
 
 def _roomiest(region: BoolArray) -> tuple[int, int, float] | None:
-    """Row, column and width (as a part of the panel) of the roomiest place in a region."""
+    """Row, column and width (fraction of the panel) of the roomiest place in a region."""
     from scipy.ndimage import distance_transform_edt
 
     if not region.any():
@@ -122,25 +149,18 @@ def _roomiest(region: BoolArray) -> tuple[int, int, float] | None:
     return int(row), int(column), min(max(float(width), 0.3), 0.62)
 
 
-def level_legend(figure: Figure, levels: Sequence[float] = PERCENT, unit: str = " %") -> None:
-    """The greys and lines of the levels, above all panels."""
-    from matplotlib.lines import Line2D
+def _level_legend(figure: Figure, levels: Sequence[float], unit: str) -> None:
+    """Draw the greys and lines of the levels above all panels."""
     from matplotlib.patches import Patch
 
-    handles: list[Patch | Line2D] = [
-        Patch(facecolor=_GREYS[0], edgecolor=INK, label=f"below {levels[0]:g}{unit}")
-    ]
-    for k, level in enumerate(levels):
-        label = f"above {level:g}{unit}"
-        handles.append(
-            Patch(
-                facecolor=_GREYS[k + 1],
-                edgecolor=INK,
-                linewidth=_WIDTHS[k],
-                linestyle=_DASHES[k],
-                label=label,
-            )
+    handles = [Patch(facecolor=_GREYS[0], edgecolor=INK, label=f"below {levels[0]:g}{unit}")]
+    handles += [
+        Patch(
+            facecolor=grey, edgecolor=INK, linewidth=width, linestyle=dash,
+            label=f"above {level:g}{unit}",
         )
+        for level, grey, width, dash in zip(levels, _GREYS[1:], _WIDTHS, _DASHES, strict=True)
+    ]  # fmt: skip
     figure.legend(
         handles=handles, loc="upper center", ncols=len(handles), frameon=False, fontsize=9,
         handlelength=2.6, borderaxespad=0.2,
@@ -148,7 +168,10 @@ def level_legend(figure: Figure, levels: Sequence[float] = PERCENT, unit: str = 
 
 
 def columns_of(**arrays: FloatArray | list[str]) -> dict[str, list[float | str]]:
-    """Columns from arrays that broadcast against each other, or lists of one length with them."""
+    """Return columns from arrays that broadcast together, and lists of texts of the same length.
+
+    Names carry the units.
+    """
     numbers = {name: a for name, a in arrays.items() if not isinstance(a, list)}
     spread = np.broadcast_arrays(*numbers.values())
     made: dict[str, list[float | str]] = {
@@ -161,5 +184,5 @@ def columns_of(**arrays: FloatArray | list[str]) -> dict[str, list[float | str]]
 
 
 def joined(parts: Sequence[Mapping[str, list[float | str]]]) -> dict[str, list[float | str]]:
-    """The rows of several tables of the same columns, one after the other."""
+    """Return the rows of several tables with the same columns, one after the other."""
     return {name: [value for part in parts for value in part[name]] for name in parts[0]}

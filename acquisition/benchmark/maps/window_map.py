@@ -1,15 +1,24 @@
-"""Where the measuring window dies: what is left of it, and how wrong it gets, towards grazing."""
+"""Map of the measuring window towards grazing: pixels left in it, and bias of its mean."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from acquisition.benchmark.maps.map_style import MapPicture, columns_of, joined
+from acquisition.benchmark.maps.map_style import columns_of, joined
+from acquisition.benchmark.output.axes_grid import axes_grid
+from acquisition.benchmark.result import MapPicture
+from acquisition.benchmark.studies.window_truth import (
+    LAMP_DEG,
+    LAMP_MM,
+    irradiance,
+    patch_mean,
+    shipped_camera,
+)
 from acquisition.measure.window import window_at
 from analysis.report.style import BAND, GREY, INK, style_of, svg_of
+from instrument.config.protocol import PatchConfig
 from instrument.geometry import FloatArray
 from instrument.pinhole import Pinhole, apply_homography
 
@@ -17,155 +26,94 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FEW_PIXELS = 100.0
-"""A protocol's least number of pixels, where it says nothing else."""
+FEW_PIXELS = float(PatchConfig.model_fields["min_pixels"].default)
+"""Least number of pixels of a protocol that does not set it."""
 TOLERABLE = 1e-3
-"""The window's promise: the mean is the patch's radiance to a thousandth."""
+"""Specification of the window: its mean is the patch's radiance to this relative error."""
 
+RIGS = ("bench_12bit", "paper_1995")
 PATCHES_MM = (20.0, 5.0)
 VIEWS_DEG = np.concatenate([np.arange(0.0, 80.0, 2.5), np.arange(80.0, 89.6, 0.25)])
 
-_LAMP_DEG, _LAMP_MM = 45.0, 1000.0  # whose light falls off over the patch
-
-
-class Camera(NamedTuple):
-    """A shipped rig's camera: picture's width and height in pixels, field and beam in mm."""
-
-    name: str
-    pinhole: Pinhole
-
-
-CAMERAS = (
-    Camera(
-        "bench_12bit",
-        Pinhole(
-            beam_length_mm=800.0,
-            field_width_mm=72.0,
-            width_px=640,
-            height_px=512,
-            axis_column_px=317.0,
-            axis_row_px=257.5,
-            roll_deg=0.4,
-        ),
-    ),
-    Camera(
-        "paper_1995",
-        Pinhole(
-            beam_length_mm=1828.8,
-            field_width_mm=90.0,
-            width_px=512,
-            height_px=480,
-            axis_column_px=255.5,
-            axis_row_px=239.5,
-            roll_deg=0.0,
-        ),
-    ),
-)
-"""Those of the rigs that the program comes with: written here, as a bench may be run far from the
-folder of the rig files."""
-
 
 def window_picture() -> MapPicture:
-    """Pixels in the window and its bias against the view angle, for rigs and patches."""
-    lines = list(_lines())
+    """Map pixels in the window and its bias against the view angle, for rigs and patches."""
+    lines: dict[str, tuple[FloatArray, FloatArray]] = {}
+    for rig in RIGS:
+        for side_mm in PATCHES_MM:
+            found = [pixels_and_bias(shipped_camera(rig), float(v), side_mm) for v in VIEWS_DEG]
+            pixels, bias = np.array(found).T
+            lines[f"{rig}, {side_mm:g} mm"] = (pixels, bias)
 
     def draw(figure: Figure) -> None:
-        height = figure.get_size_inches()[1]
-        grid = {"left": 0.085, "right": 0.985, "top": 1 - 0.62 / height, "bottom": 0.52 / height,
-                "wspace": 0.24}  # fmt: skip
-        left, right = figure.subplots(1, 2, gridspec_kw=grid)
-        for k, (label, pixels, bias) in enumerate(lines):
+        left, right = axes_grid(figure, 1, 2, top_in=0.62, left=0.085, wspace=0.24)
+        for k, (label, (pixels, bias)) in enumerate(lines.items()):
             colour, marker, dashes = style_of(k)
-            style = {
-                "color": colour,
-                "linestyle": dashes,
-                "marker": marker,
-                "markevery": 9,
-                "ms": 4,
+            style: dict[str, Any] = {
+                "color": colour, "linestyle": dashes, "marker": marker, "markevery": 9, "ms": 4,
                 "linewidth": 1.1,
-            }
+            }  # fmt: skip
             left.plot(VIEWS_DEG, pixels, label=label, **style)
-            right.plot(VIEWS_DEG, _upper(bias), **style)
-        _too_few(left)
-        _too_wrong(right)
+            right.plot(VIEWS_DEG, _envelope(bias), **style)
+        _frame_pixels(left)
+        _frame_bias(right)
         figure.legend(loc="upper center", ncols=4, frameon=False, fontsize=8.5, borderaxespad=0.2)
 
     caption = (
-        "Left: whole pixels’ worth in the window of a square patch. Right: by how much the mean "
-        f"over its pixels misses the patch’s mean irradiance under a lamp at {_LAMP_DEG:g}°, "
-        f"{_LAMP_MM / 1000:g} m away. The window shrinks as cos θᵣ; with few rows left each is "
-        "half outside. Below a protocol’s min_pixels the program flags a point and leaves it out."
+        "Left: number of whole pixels that the window of a square patch is worth. Right: relative "
+        "error of the mean over its pixels against the patch’s mean irradiance, under a lamp at "
+        f"{LAMP_DEG:g}°, {LAMP_MM / 1000:g} m away. The window shrinks as cos θᵣ; with few rows "
+        "left each is half outside. Below a protocol’s min_pixels a point is flagged and not used."
     )
     rows = [
         columns_of(rig=[label] * VIEWS_DEG.size, theta_r_deg=VIEWS_DEG, pixels=pixels, bias=bias)
-        for label, pixels, bias in lines
+        for label, (pixels, bias) in lines.items()
     ]
-    title = "Where the window dies"
+    title = "Where the measuring window fails"
     return MapPicture(title, caption, svg_of(3.9, draw, "map_window"), joined(rows))
 
 
-def _lines() -> Iterator[tuple[str, FloatArray, FloatArray]]:
-    for camera in CAMERAS:
-        for side_mm in PATCHES_MM:
-            found = [pixels_and_bias(camera.pinhole, float(v), side_mm) for v in VIEWS_DEG]
-            pixels, bias = np.array(found).T
-            yield f"{camera.name}, {side_mm:g} mm", pixels, bias
-
-
 def pixels_and_bias(pinhole: Pinhole, theta_r_deg: float, side_mm: float) -> tuple[float, float]:
-    """Pixels' worth in the window, and the relative error of its mean of the irradiance."""
+    """Return the pixels' worth in the window, and its relative error of the mean irradiance."""
     window = window_at(theta_r_deg, pinhole, side_mm, side_mm)
     if window.pixels == 0:
         return 0.0, float("nan")
     rows, columns = np.mgrid[window.crop]
     back: FloatArray = np.linalg.inv(pinhole.homography(theta_r_deg)).astype(np.float64)
     points = apply_homography(back, np.stack([columns, rows], axis=-1))
-    seen = irradiance(points[..., 0], points[..., 1]) * pinhole.cos4(columns, rows)
-    nodes, weights = np.polynomial.legendre.leggauss(8)
-    x, y = np.meshgrid(nodes * side_mm / 2, nodes * side_mm / 2)
-    true = float(np.sum(irradiance(x, y) * np.outer(weights, weights)) / 4)
-    return window.pixels, window.mean(seen) / true - 1
+    image = irradiance(points) * pinhole.cos4(columns, rows)
+    return window.pixels, window.mean(image) / patch_mean(irradiance, side_mm) - 1
 
 
-def irradiance(x_mm: FloatArray, y_mm: FloatArray) -> FloatArray:
-    """Of a small lamp at 45 degrees, 1 m away, relative to that on the axis."""
-    tilt = np.radians(_LAMP_DEG)
-    across, height = _LAMP_MM * np.sin(tilt), _LAMP_MM * np.cos(tilt)
-    distance2 = (x_mm - across) ** 2 + y_mm**2 + height**2
-    return np.asarray((_LAMP_MM**2 / distance2) ** 1.5)
-
-
-def _upper(bias: FloatArray) -> FloatArray:
-    """Its size, the largest of each place and its neighbours: it goes through zero often."""
+def _envelope(bias: FloatArray) -> FloatArray:
+    """|bias|, largest of each view and its neighbours, as it passes through zero often."""
     size = np.maximum(np.abs(bias), 1e-7)
     near = np.lib.stride_tricks.sliding_window_view(np.pad(size, 2, mode="edge"), 5)
     return np.asarray(near.max(axis=-1))
 
 
-def _too_few(ax: Axes) -> None:
-    ax.set_yscale("log")
-    ax.axhspan(1.0, FEW_PIXELS, color=BAND, zorder=0)
-    ax.axhline(FEW_PIXELS, color=GREY, linewidth=0.8)
+def _frame_pixels(ax: Axes) -> None:
+    _frame(ax, (1.0, FEW_PIXELS), FEW_PIXELS)
     words = f"grazing: fewer than {FEW_PIXELS:g} pixels,\nflagged and not fitted"
     ax.text(3, 22, words, size=8.5, color=INK, va="center")
     ax.set_ylim(5, 1e5)
     ax.set_yticks([10, 100, 1000, 10_000, 100_000], ["10", "100", "1000", "10⁴", "10⁵"])
-    _views(ax)
     ax.set_ylabel("pixels in the window")
 
 
-def _too_wrong(ax: Axes) -> None:
-    ax.set_yscale("log")
-    ax.axhspan(TOLERABLE, 1.0, color=BAND, zorder=0)
-    ax.axhline(TOLERABLE, color=GREY, linewidth=0.8)
-    ax.text(3, 5e-3, "more than the window promises", size=8.5, color=INK, va="center")
+def _frame_bias(ax: Axes) -> None:
+    _frame(ax, (TOLERABLE, 1.0), TOLERABLE)
+    ax.text(3, 5e-3, "outside the window’s specification", size=8.5, color=INK, va="center")
     ax.set_ylim(1e-7, 3e-2)
     ax.set_yticks([1e-6, 1e-5, 1e-4, 1e-3, 1e-2], ["10⁻⁶", "10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²"])
-    _views(ax)
     ax.set_ylabel("|bias| of the window’s mean")
 
 
-def _views(ax: Axes) -> None:
+def _frame(ax: Axes, band: tuple[float, float], limit: float) -> None:
+    """Draw the band of failure, its limit, and the axis of view angles."""
+    ax.set_yscale("log")
+    ax.axhspan(*band, color=BAND, zorder=0)
+    ax.axhline(limit, color=GREY, linewidth=0.8)
     ax.set_xlim(0, 90)
     ax.set_xticks([0, 15, 30, 45, 60, 75, 90])
     ax.set_xlabel("view angle θᵣ (°)")

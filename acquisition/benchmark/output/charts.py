@@ -1,7 +1,7 @@
-"""The charts of the bench, as SVG text: cost to the right, error upwards, better below and left.
+"""Charts of cost (right) against error (up), as SVG text; better is below and to the left.
 
-One style for all: a marker and a colour for each series, a thin line from the worst error down to
-the typical one, the Pareto front as a stepped line, a ring about the program's own choice.
+All charts have one style: a marker and a colour per series, a thin line from the worst error down
+to the median, the Pareto front as a stepped line, a ring around the program's own choice.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from acquisition.benchmark.number_text import short
+from acquisition.benchmark.output.axes_grid import axes_grid
 from acquisition.benchmark.output.labels import Box, place
 from acquisition.benchmark.study import Study
 from acquisition.benchmark.trial import Trial, pareto_front
@@ -30,18 +31,16 @@ MAIN = (("rough_surface", 1), ("window", 1), ("fit_misses", 2), ("scan", 0))
 
 
 def study_chart(study: Study) -> str:
-    """All scenes of a study side by side, with one error axis."""
+    """Return the scenes of a study side by side, with one error axis."""
     scenes = study.scenes
     legend = _series_legend(study)
     rows = -(-len(legend) // 4)
 
     def draw(figure: Figure) -> None:
-        height = figure.get_size_inches()[1]
-        grid = {
-            "left": 0.075, "right": 0.985, "top": 1 - (0.32 + 0.21 * rows) / height,
-            "bottom": 0.5 / height, "wspace": 0.06,
-        }  # fmt: skip
-        axes = figure.subplots(1, len(scenes), sharey=True, squeeze=False, gridspec_kw=grid)[0]
+        top_in = 0.32 + 0.21 * rows
+        axes = axes_grid(
+            figure, 1, len(scenes), top_in=top_in, bottom_in=0.5, wspace=0.06, share_y=True
+        )
         limits = _limits(study.trials)
         for ax, scene in zip(axes, scenes, strict=True):
             _panel(ax, study, scene, limits, ax is axes[0])
@@ -57,19 +56,15 @@ def study_chart(study: Study) -> str:
 
 
 def main_chart(studies: Sequence[Study]) -> str:
-    """Four panels, one of each kind of choice: the chart of the README."""
+    """Return the chart of the README: four panels, one for each kind of choice."""
     known = {study.name: study for study in studies}
     shown = [(known[name], min(n, len(known[name].scenes) - 1)) for name, n in MAIN]
 
     def draw(figure: Figure) -> None:
-        grid = {
-            "left": 0.075, "right": 0.985, "top": 0.915, "bottom": 0.062, "wspace": 0.2,
-            "hspace": 0.33,
-        }  # fmt: skip
-        axes = figure.subplots(2, 2, squeeze=False, gridspec_kw=grid)
-        for ax, (study, n) in zip(axes.flat, shown, strict=True):
+        axes = axes_grid(figure, 2, 2, top_in=0.714, bottom_in=0.521, wspace=0.2, hspace=0.33)
+        for ax, (study, n) in zip(axes, shown, strict=True):
             scene = study.scenes[n]
-            _panel(ax, study, scene, _limits(study.of(scene)))
+            _panel(ax, study, scene, _limits(study.in_scene(scene)))
             ax.set_title(f"{study.title.partition(':')[0]}: {scene}", color=INK, loc="left", pad=5)
             ax.set_xlabel(study.cost_axis)
             ax.set_ylabel(study.error_axis)
@@ -80,8 +75,8 @@ def main_chart(studies: Sequence[Study]) -> str:
     return svg_of(8.4, draw, "main")
 
 
-def alone(svg: str) -> str:
-    """An SVG of a page as a file of its own: white behind it, fonts that others have too."""
+def standalone(svg: str) -> str:
+    """Return an SVG of a page as a file of its own: white background, fallback fonts."""
     head, end, body = svg.partition(">")
     fonts = '"DejaVu Sans", Verdana, Arial, sans-serif'.replace('"', "&quot;")
     white = '<rect width="100%" height="100%" fill="white"/>'
@@ -91,8 +86,8 @@ def alone(svg: str) -> str:
 def _panel(
     ax: Axes, study: Study, scene: str, limits: tuple[float, float], first: bool = True
 ) -> None:
-    """One scene; the `first` of a row has the numbers of the error axis."""
-    trials = study.of(scene)
+    """Draw one scene; the `first` panel of a row has the numbers of the error axis."""
+    trials = study.in_scene(scene)
     _scale(ax, study, limits)
     _front(ax, trials, limits)
     for number, series in enumerate(study.series):
@@ -127,13 +122,13 @@ def _scale(ax: Axes, study: Study, limits: tuple[float, float]) -> None:
 
 
 def _limits(trials: Sequence[Trial]) -> tuple[float, float]:
-    """Ends of the error axis; errors of nought lie on its lower end, infinite ones on the upper."""
+    """Ends of the error axis; errors of 0 lie on its lower end, infinite ones on the upper."""
     pairs = [(t.error, min(t.error, t.error_median)) for t in trials]
     errors = [e for pair in pairs for e in pair if 0 < e < math.inf]
     low, high = min(errors, default=0.1), max(errors, default=1.0)
     room = max((high / low) ** 0.08, 2.0)
-    for_nought = room**3 if any(t.error == 0 for t in trials) else 1.0
-    return low / room / for_nought, high * room
+    for_zero = room**3 if any(t.error == 0 for t in trials) else 1.0
+    return low / room / for_zero, high * room
 
 
 def _within(value: float, limits: tuple[float, float]) -> float:
@@ -179,7 +174,7 @@ def _ring(ax: Axes, x: float, y: float) -> None:
 
 
 def _name(ax: Axes, study: Study, trials: Sequence[Trial], limits: tuple[float, float]) -> None:
-    """Labels beside the marks, with a thin line where there is no room next to one."""
+    """Write labels beside the marks, with a thin line to those that have no room next to theirs."""
     marks = [_at(ax, t.cost, _within(t.error, limits)) for t in trials]
     texts = [_label(t, study, trials) for t in trials]
     left, bottom = _at(ax, ax.get_xlim()[0], limits[0])
@@ -193,14 +188,14 @@ def _name(ax: Axes, study: Study, trials: Sequence[Trial], limits: tuple[float, 
 
 
 def _at(ax: Axes, x: float, y: float) -> tuple[float, float]:
-    """A place of the data in points of the figure."""
+    """Convert data coordinates to points of the figure."""
     to_points = ax.transData - ax.figure.dpi_scale_trans
     at = 72 * to_points.transform((x, y))
     return float(at[0]), float(at[1])
 
 
 def _lines(ax: Axes, trials: Sequence[Trial], limits: tuple[float, float]) -> list[Box]:
-    """What labels had better not cover: rings, the lines to the medians, the front."""
+    """Boxes that labels avoid: rings, the lines to the medians, the front."""
     boxes = []
     for t in trials:
         x, y = _at(ax, t.cost, _within(t.error, limits))
@@ -221,8 +216,7 @@ def _lines(ax: Axes, trials: Sequence[Trial], limits: tuple[float, float]) -> li
 def _write(
     ax: Axes, mark: tuple[float, float], box: Box, text: str, far: bool, weight: str
 ) -> None:
-    line: dict[str, Any] = {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0}
-    line["shrinkB"] = 4
+    line = {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 4}
     ax.annotate(
         text, xy=mark, xycoords="figure points",
         xytext=((box.left + box.right) / 2, (box.bottom + box.top) / 2),
@@ -233,7 +227,7 @@ def _write(
 
 
 def _label(trial: Trial, study: Study, trials: Sequence[Trial]) -> str:
-    """The method's name; of limits, that of their kind, once, beside the default."""
+    """Text of a mark: the method's name; for limits their kind, once, beside the default."""
     if trial.bound:
         beside = any(t.default and t.cost == trial.cost for t in trials)
         return trial.series if beside else ""
@@ -260,21 +254,21 @@ def _series_legend(study: Study) -> list[Line2D]:
 
 
 def _signs(error_is: str = "worst", peer: bool = False) -> list[Line2D]:
-    """What front, ring and thin line mean."""
+    """Legend entries of the front, the ring and the thin line."""
     from matplotlib.lines import Line2D
 
     found = [
-        Line2D([], [], color="#999999", linewidth=1.2, label="Pareto front"),
-        Line2D(
-            [], [], ls="", marker="o", ms=10, mfc="none", c=INK, mew=1.3, label="program’s default"
-        ),
-        Line2D([], [], ls="", marker="|", ms=11, c=GREY, label=f"{error_is} (mark) to median"),
+        Line2D([], [], label="Pareto front", **_FRONT),
+        _sign("program’s default", marker="o", ms=10, mfc="none", mew=1.3),
+        _sign(f"{error_is} (mark) to median", marker="|", ms=11, c=GREY),
     ]
     if peer:
-        found.append(
-            Line2D([], [], ls="", marker=_PEER, ms=7, c=INK, mfc="white", label="another program")
-        )
-        found.append(
-            Line2D([], [], ls="", marker="_", ms=8, mew=1.4, c=INK, label="limit (Cramér–Rao)")
-        )
+        found.append(_sign("another program", marker=_PEER, ms=7, mfc="white"))
+        found.append(_sign("limit (Cramér–Rao)", marker="_", ms=8, mew=1.4))
     return found
+
+
+def _sign(label: str, **style: Any) -> Line2D:
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], **{"ls": "", "c": INK, "label": label, **style})

@@ -1,4 +1,4 @@
-"""What a bench leaves behind: bench.json, a CSV table for each study, the page, the main chart."""
+"""Files of a benchmark: bench.json, a CSV table per study and map, the page, the main chart."""
 
 from __future__ import annotations
 
@@ -11,64 +11,62 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from acquisition.benchmark.output.charts import alone, main_chart
+from acquisition.benchmark.output.charts import main_chart, standalone
 from acquisition.benchmark.output.page import page
-from acquisition.benchmark.result import Bench, BenchFiles, MapPicture
+from acquisition.benchmark.result import BenchmarkResult, MapPicture
 from acquisition.benchmark.study import Study
 from acquisition.benchmark.trial import Trial, pareto_front
 from instrument.errors import InputError
 from instrument.text.atomic_file import write_whole
 
 SCHEMA = 1
-"""Of bench.json: counted up when a field is renamed or means something else."""
+"""Of bench.json; increased when a field is renamed or changes its meaning."""
 
 _COLUMNS = tuple(f.name for f in fields(Trial) if f.name != "more")
+_ERRORS = ("error", "error_median")
 
 
 def empty_folder(folder: Path) -> None:
-    """Make the folder. Raises `InputError` where it is there already and not empty."""
+    """Make the folder. Raises `InputError` if it exists and is not empty."""
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError(f"{folder}: --out must be absent or an empty folder: name another")
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder}: cannot write the bench there: {error}") from error
+        raise InputError(f"{folder}: cannot write the benchmark there: {error}") from error
 
 
-def write(bench: Bench, folder: Path) -> BenchFiles:
-    """Write all files of a bench into a folder that is there."""
-    left = BenchFiles(
-        folder, folder / "bench.html", folder / "bench.json", folder / "main_chart.svg"
-    )
-    write_whole(left.json, to_json(bench))
-    for study in bench.studies:
-        write_whole(folder / f"{study.name}.csv", table(study))
-    for number, picture in enumerate(bench.maps, start=1):
-        write_whole(folder / f"map_{number}.csv", map_table(picture))
-    write_whole(left.main_chart, alone(main_chart(bench.studies)))
-    write_whole(left.page, page(bench))
-    return left
+def write(result: BenchmarkResult, folder: Path) -> Path:
+    """Write all files into an existing folder; return the path of the page."""
+    texts = {"bench.json": to_json(result)}
+    texts |= {f"{study.name}.csv": table(study) for study in result.studies}
+    texts |= {f"map_{n}.csv": map_table(m) for n, m in enumerate(result.maps, start=1)}
+    texts["main_chart.svg"] = standalone(main_chart(result.studies))
+    texts["bench.html"] = page(result)  # last: a page means that the rest is there
+    for name, text in texts.items():
+        write_whole(folder / name, text)
+    return folder / "bench.html"
 
 
-def to_json(bench: Bench) -> str:
-    """The bench as JSON; an infinite error is null. Maps have tables and pictures of their own."""
+def to_json(result: BenchmarkResult) -> str:
+    """Return the studies as JSON, an infinite error as null. Maps are not in it."""
     studies = [
         {**asdict(study), "trials": [_plain(trial) for trial in study.trials]}
-        for study in bench.studies
+        for study in result.studies
     ]
     whole = {
         "schema": SCHEMA,
-        "effort": bench.effort,
-        "seconds": round(bench.seconds, 1),
-        "machine": dict(bench.machine),
-        "peers": list(bench.peers),
+        "effort": result.effort,
+        "seconds": round(result.seconds, 1),
+        "machine": dict(result.machine),
+        "peers": list(result.peers),
         "studies": studies,
     }
     return json.dumps(whole, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def from_json(text: str) -> Bench:
-    """A bench from its JSON. Raises `InputError` for another schema."""
+def from_json(text: str) -> BenchmarkResult:
+    """Return a result from its JSON, without maps. Raises `InputError` for another schema."""
     whole: dict[str, Any] = json.loads(text)
     if whole.get("schema") != SCHEMA:
         raise InputError(f"bench.json: schema {whole.get('schema')}; allowed: {SCHEMA}")
@@ -76,33 +74,32 @@ def from_json(text: str) -> Bench:
         Study(**{**study, "trials": tuple(map(_trial, study["trials"]))})
         for study in whole["studies"]
     )
-    return Bench(
-        whole["effort"], whole["seconds"], whole["machine"], tuple(whole["peers"]), studies
-    )
+    others = {name: whole[name] for name in ("effort", "seconds", "machine")}
+    return BenchmarkResult(**others, peers=tuple(whole["peers"]), studies=studies)
 
 
 def _plain(trial: Trial) -> dict[str, object]:
     found = {name: getattr(trial, name) for name in _COLUMNS}
-    for name in ("error", "error_median"):
-        found[name] = found[name] if math.isfinite(found[name]) else None
-    return found | {"more": dict(trial.more)}
+    finite = {name: found[name] if math.isfinite(found[name]) else None for name in _ERRORS}
+    return {**found, **finite, "more": dict(trial.more)}
 
 
 def _trial(plain: dict[str, Any]) -> Trial:
-    for name in ("error", "error_median"):
-        plain = {**plain, name: math.inf if plain[name] is None else plain[name]}
-    return Trial(**plain)
+    errors = {name: math.inf if plain[name] is None else plain[name] for name in _ERRORS}
+    return Trial(**{**plain, **errors})
 
 
 def table(study: Study) -> str:
-    """A study as CSV: a row a trial, whether it is on its scene's front, and further figures."""
+    """Return a study as CSV: one row per trial, with its place on the front and more figures."""
     more = sorted({name for trial in study.trials for name in trial.more})
-    fronts = {(t.scene, t.label) for scene in study.scenes for t in pareto_front(study.of(scene))}
+    fronts = {
+        (t.scene, t.label) for scene in study.scenes for t in pareto_front(study.in_scene(scene))
+    }
     rows = (
         [
-            *(_cell(getattr(t, name)) for name in _COLUMNS),
-            _cell((t.scene, t.label) in fronts),
-            *(_cell(t.more.get(name, "")) for name in more),
+            *(getattr(t, name) for name in _COLUMNS),
+            (t.scene, t.label) in fronts,
+            *(t.more.get(name, "") for name in more),
         ]
         for t in study.trials
     )
@@ -110,16 +107,15 @@ def table(study: Study) -> str:
 
 
 def map_table(picture: MapPicture) -> str:
-    """The numbers behind a map as CSV."""
-    rows = zip(*picture.columns.values(), strict=True)
-    return _csv(list(picture.columns), ([_cell(value) for value in row] for row in rows))
+    """Return the numbers of a map as CSV."""
+    return _csv(list(picture.columns), zip(*picture.columns.values(), strict=True))
 
 
-def _csv(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def _csv(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
-    writer.writerows(rows)
+    writer.writerows([_cell(value) for value in row] for row in rows)
     return text.getvalue()
 
 

@@ -1,4 +1,4 @@
-"""Where a chart's labels stand so that they cover neither one another nor a mark."""
+"""Placement of a chart's labels such that they cover neither one another nor a mark."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 _GAP = 3.0  # points between a mark and its label
-_NEAR = 12.0  # points: further off, a thin line leads from the label to its mark
+_NEAR = 12.0  # points: beyond it, a thin line leads from the label to its mark
 _RINGS = (7.0, 13.0, 20.0, 28.0, 38.0, 50.0, 64.0)
 _DIRECTIONS = (0, 180, 90, 270, 30, 150, 210, 330, 60, 120, 240, 300)
 
@@ -22,19 +22,19 @@ class Box(NamedTuple):
     top: float
 
     def shared(self, other: Box) -> float:
-        """Area that two rectangles share."""
+        """Return the area of the intersection."""
         width = min(self.right, other.right) - max(self.left, other.left)
         height = min(self.top, other.top) - max(self.bottom, other.bottom)
         return max(width, 0.0) * max(height, 0.0)
 
     def outside(self, frame: Box) -> float:
-        """Area that lies outside a frame."""
+        """Return the area outside a frame."""
         own = (self.right - self.left) * (self.top - self.bottom)
         return own - self.shared(frame)
 
 
 class Placed(NamedTuple):
-    """A label's box, and whether a line should lead to it."""
+    """Box of a label; `far` if a line should lead to it."""
 
     box: Box
     far: bool
@@ -47,9 +47,9 @@ def place(
     size: float,
     taken: Sequence[Box] = (),
 ) -> list[Placed]:
-    """A place for each text near its mark (points), the most crowded first; "" needs none.
+    """Place each text near its mark (points), the most crowded first; "" needs no place.
 
-    Of all places the one that covers least, and of those the nearest one.
+    Of all candidates the one that covers least is taken, and of those the nearest.
     """
     obstacles = [*taken, *(Box(x - 5, y - 5, x + 5, y + 5) for x, y in marks)]
     order = sorted(range(len(marks)), key=lambda n: -_crowd(n, marks))
@@ -80,7 +80,7 @@ def _best(
 
 
 def _at(mark: tuple[float, float], size: tuple[float, float], ring: float, degrees: int) -> Box:
-    """The box of a label in a direction from its mark, its nearest edge `ring` points off."""
+    """Box of a label in a direction from its mark, its nearest edge `ring` points away."""
     x = mark[0] + ring * math.cos(math.radians(degrees))
     y = mark[1] + ring * math.sin(math.radians(degrees))
     width, height = size
@@ -90,13 +90,13 @@ def _at(mark: tuple[float, float], size: tuple[float, float], ring: float, degre
 
 
 def _crowd(n: int, marks: Sequence[tuple[float, float]]) -> float:
-    """How near a mark's neighbours are."""
+    """Density of other marks around a mark."""
     return sum(1 / (1 + math.dist(marks[n], other)) for other in marks)
 
 
 @lru_cache(maxsize=512)
 def text_size(text: str, size: float) -> tuple[float, float]:
-    """Width and height of a line of text in points, with a little room about it."""
+    """Return width and height of a line of text in points, with a small margin."""
     from matplotlib.textpath import TextPath
 
     width = TextPath((0, 0), text, size=size).get_extents().width

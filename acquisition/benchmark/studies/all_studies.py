@@ -1,4 +1,4 @@
-"""All studies of the bench, in the order of the page."""
+"""All studies of the benchmark, in the order of the page."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _STEPS: tuple[tuple[str, Callable[[Effort], tuple[Study, ...]]], ...] = (
 
 
 def studies(effort: Effort, tell: Callable[[str], None]) -> Iterator[Study]:
-    """Measure one after the other; `tell` hears what comes next."""
+    """Measure one study after the other; `tell` is called with the name of each before it."""
     for number, (words, measure) in enumerate(_STEPS, start=1):
         tell(f"{number}/{len(_STEPS)} {words}")
         yield from measure(effort)

@@ -1,6 +1,6 @@
-"""Bits and frames: seconds on the bench against the error of a window's mean.
+"""Bits and frames: time per point against the error of the window's mean.
 
-A sensor is simulated pixel by pixel, from electrons with photon and read noise (normal, as from
+A sensor is simulated pixel by pixel, from electrons with photon and read noise (normal, valid from
 some hundred electrons on) to rounded counts, with its darks; the truth is the light put in.
 """
 
@@ -12,24 +12,25 @@ from itertools import product
 
 import numpy as np
 
+from acquisition.benchmark.demo_scan import shipped_demo
 from acquisition.benchmark.effort import Effort
 from acquisition.benchmark.number_text import rounded
+from acquisition.benchmark.studies.method import rms_and_median
 from acquisition.benchmark.study import Study
-from acquisition.benchmark.trial import Trial
+from acquisition.benchmark.trial import Trial, select
 from acquisition.measure.radiometry import rounding_u_dn
+from instrument.config.camera import CameraConfig
 from instrument.geometry import FloatArray
 
 BITS, FRAMES = (8, 10, 12, 16), (1, 4, 16, 64)
 DEFAULT = (12, 4)
 PIXELS = 1000  # of the window at 75 degrees and more, where it is smallest
-DARK_FRAMES = 8
-_FULL_WELL, _OVERHEAD_S, _EXPOSURE_S = 30000.0, 0.02, 0.05  # as of the bench_12bit rig
-_BLACK_PART = 64 / 4095  # of full scale
+_EXPOSURE_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Light as a part of the full well, and read noise in electrons."""
+    """Light as a fraction of the full well, and read noise in electrons."""
 
     name: str
     level: float
@@ -44,20 +45,20 @@ SCENES = (
 
 
 def bits_study(effort: Effort) -> Study:
-    """All bits and frames in all scenes."""
+    """Compare all bit depths and numbers of frames in all scenes."""
     trials = tuple(
         _trial(scene, bits, frames, effort.draws)
         for scene, bits, frames in product(SCENES, BITS, FRAMES)
     )
     return Study(
-        "camera_bits",
-        "Camera: bits against frames",
-        "time per point (s)",
-        "relative error of the window’s mean, rms",
-        _caption(trials),
-        f"the light put into a simulated sensor; {PIXELS} pixels, {DARK_FRAMES} dark frames, "
-        f"{effort.draws} draws",
-        trials,
+        name="camera_bits",
+        title="Camera: bits against frames",
+        cost_axis="time per point (s)",
+        error_axis="relative error of the window’s mean, rms",
+        caption=_caption(trials),
+        truth=f"the light put into a simulated sensor; {PIXELS} pixels, {_dark_frames()} dark "
+        f"frames, {effort.draws} draws",
+        trials=trials,
         error_is="rms",
         joined=True,
     )
@@ -65,16 +66,15 @@ def bits_study(effort: Effort) -> Study:
 
 def _caption(trials: tuple[Trial, ...]) -> str:
     def error(scene: Scene, bits: int) -> float:
-        label = _label(bits, DEFAULT[1])
-        return next(t.error for t in trials if (t.scene, t.label) == (scene.name, label))
+        return select(trials, scene=scene.name, label=_label(bits, DEFAULT[1]))[0].error
 
-    ratio = {s.name: error(s, 8) / error(s, 12) for s in SCENES}
-    words = "; ".join(f"{rounded(value)} ({name})" for name, value in ratio.items())
+    ratios = {s.name: error(s, 8) / error(s, 12) for s in SCENES}
+    words = "; ".join(f"{rounded(ratio)} ({name})" for name, ratio in ratios.items())
     return (
-        f"With {DEFAULT[1]} frames 8 bits are worse than 12 by these factors: {words}. Where it is "
-        "bright nearly all of that comes with the dark, which no noise dithers.\nWhere noise is "
-        "wider than a count it takes the place of bits, and only frames help; where it is not, "
-        "frames do not help, and only bits do."
+        f"With {DEFAULT[1]} frames the error at 8 bits exceeds that at 12 bits by these factors: "
+        f"{words}. In the bright scene nearly all of it comes from the dark frames, whose noise is "
+        "too small to dither them.\nNoise wider than a count replaces bits, and only more frames "
+        "reduce the error; with less noise more frames do not help, and only more bits do."
     )
 
 
@@ -83,48 +83,60 @@ def _label(bits: int, frames: int) -> str:
 
 
 def _trial(scene: Scene, bits: int, frames: int, draws: int) -> Trial:
-    off = np.abs(errors(scene, bits, frames, draws))
     return Trial(
-        "camera_bits",
-        scene.name,
-        f"{bits} bit",
-        _label(bits, frames),
-        frames * (_EXPOSURE_S + _OVERHEAD_S),
-        float(np.sqrt(np.mean(off**2))),
-        float(np.median(off)),
-        (bits, frames) == DEFAULT,
+        study="camera_bits",
+        scene=scene.name,
+        series=f"{bits} bit",
+        label=_label(bits, frames),
+        cost=frames * (_EXPOSURE_S + _camera().frame_overhead_s),
+        default=(bits, frames) == DEFAULT,
         more={"u_rounding_relative": _u_rounding(scene, bits)},
+        **rms_and_median(reading_errors(scene, bits, frames, draws)),
     )
 
 
+def _camera() -> CameraConfig:
+    return shipped_demo().rig.camera
+
+
+def _dark_frames() -> int:
+    return shipped_demo().protocol.dark_frames
+
+
 def _u_rounding(scene: Scene, bits: int) -> float:
-    """What the program itself states for rounding, of light and dark together, relative."""
-    gain, electrons = _electrons_per_dn(bits), scene.level * _FULL_WELL
+    """Relative uncertainty that the program states for rounding, of light and dark together."""
+    gain, electrons = _electrons_per_dn(bits), scene.level * _camera().full_well_electrons
     noise2 = scene.read_noise_electrons**2
     both = [rounding_u_dn(variance / gain**2) for variance in (electrons + noise2, noise2)]
     return math.hypot(*both) * gain / electrons
 
 
-def errors(scene: Scene, bits: int, frames: int, draws: int) -> FloatArray:
-    """Relative errors of the mean, less the dark, in `draws` readings of slightly other levels.
+def reading_errors(scene: Scene, bits: int, frames: int, draws: int) -> FloatArray:
+    """Return the relative errors, (draws,), of the mean minus the dark.
 
-    The levels differ by a count's width, so that rounding strikes each differently.
+    The light levels of the draws differ by up to a count, so that rounding affects each
+    differently.
     """
     random = np.random.default_rng([bits, frames, round(1e4 * scene.level)])
-    gain = _electrons_per_dn(bits)
-    levels = scene.level * _FULL_WELL + gain * random.uniform(-0.5, 0.5, draws)
-    black = _BLACK_PART * (2**bits - 1) + random.uniform(-0.5, 0.5, draws)
+    gain, full_well = _electrons_per_dn(bits), _camera().full_well_electrons
+    levels = scene.level * full_well + gain * random.uniform(-0.5, 0.5, draws)
+    black = _black_fraction() * (2**bits - 1) + random.uniform(-0.5, 0.5, draws)
     found = np.empty(draws)
     for n, (electrons, offset) in enumerate(zip(levels, black, strict=True)):
         light = _mean_dn(random, electrons, offset, scene, bits, frames)
-        dark = _mean_dn(random, 0.0, offset, scene, bits, DARK_FRAMES)
+        dark = _mean_dn(random, 0.0, offset, scene, bits, _dark_frames())
         found[n] = (light - dark) * gain / electrons - 1
     return found
 
 
+def _black_fraction() -> float:
+    """Black level of the demonstration's camera as a fraction of full scale."""
+    return _camera().black_level_dn / _camera().max_dn
+
+
 def _electrons_per_dn(bits: int) -> float:
-    counts = float(2**bits - 1) * (1 - _BLACK_PART)
-    return _FULL_WELL / counts
+    counts = float(2**bits - 1) * (1 - _black_fraction())
+    return _camera().full_well_electrons / counts
 
 
 def _mean_dn(

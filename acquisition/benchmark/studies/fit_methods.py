@@ -1,7 +1,6 @@
-"""Ways to fit: milliseconds against the distance from the optimum, and how often it is missed.
+"""Fit methods: time per fit against the distance from the optimum, and the starts that miss it.
 
-Every method gets the same noisy scans and the same random starts over the whole domain. The optimum
-of each scan is the deepest minimum of many descents with the tightest tolerance.
+Every method gets the same noisy scans and the same random starts over the whole domain.
 """
 
 from __future__ import annotations
@@ -9,7 +8,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -17,93 +17,76 @@ import numpy as np
 from acquisition.benchmark.effort import Effort
 from acquisition.benchmark.number_text import percent, rounded
 from acquisition.benchmark.peers import installed, lmfit_minimum
+from acquisition.benchmark.studies.fit_truth import (
+    SCENES,
+    Optimum,
+    noisy_scan,
+    optimum,
+    random_starts,
+    with_scales,
+)
+from acquisition.benchmark.studies.method import Method
 from acquisition.benchmark.study import Study
-from acquisition.benchmark.trial import Trial
-from analysis.data.covariance import Covariance
+from acquisition.benchmark.trial import Trial, select
 from analysis.data.measurements import Measurements
 from analysis.fit.first_fit import first_fit
 from analysis.fit.problem import Problem
-from analysis.fit.starting_values import bounded_least_squares, starting_values
-from analysis.models import MODELS, Model
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import FloatArray
 
 MISSED_U = 0.1
-"""A result further from the optimum than this many standard uncertainties has missed it."""
-NOISE = 0.005  # relative, of a point
-_GRID_STARTS = 3  # of the program's own, for the optimum
-_TIGHT = 1e-15
-
-Scene = tuple[str, str, dict[str, float]]
-SCENES: tuple[Scene, ...] = (
-    ("matte: 2 parameters", "oren_nayar", {"albedo": 0.8, "sigma_deg": 25.0}),
-    (
-        "matte and glossy: 3 parameters",
-        "oren_nayar+torrance_sparrow",
-        {"albedo": 0.8, "sigma_deg": 20.0, "ks": 0.076},
-    ),
-    (
-        "layered and glossy: 5 parameters",
-        "lambert+ggx+single_scattering",
-        {"albedo": 0.5, "f0": 0.05, "alpha": 0.25, "scattering": 0.4, "asymmetry": -0.4},
-    ),
-)
+"""A result further from the optimum than this, in standard uncertainties, has missed it."""
 
 Solve = Callable[[Problem, FloatArray], FloatArray]
+"""Parameters, (parameters,) in their units, from a problem and a start of the same form."""
 
 
-@dataclass(frozen=True, slots=True)
-class Method:
-    """`solve(problem, start)` gives the parameters; with `own_starts` it needs no start."""
+def program_fit(problem: Problem, start: FloatArray) -> FloatArray:
+    """Fit as the program does; a `Solve` that ignores its start (shape and units as there).
 
-    series: str
-    label: str
-    solve: Solve
-    default: bool = False
-    peer: bool = False
-    own_starts: bool = False
-    note: str = ""
-
-
-def as_the_program(problem: Problem, start: FloatArray) -> FloatArray:
-    """The program's own: starts from a coarse grid, the linear parameters solved for there."""
+    Starts come from a coarse grid, with the linear parameters solved for.
+    """
     del start
     g, u = problem.geometry, np.sqrt(problem.covariance.variance)
     points = Measurements.bare(g.theta_i_deg, g.theta_r_deg, g.dphi_deg, problem.brdf, u)
     return first_fit(problem.model, points).solution.x
 
 
-def descent(problem: Problem, start: FloatArray) -> FloatArray:
-    """The program's descent from a given start."""
+def lmfit_fit(problem: Problem, start: FloatArray) -> FloatArray:
+    """Fit with lmfit's default method on the same residuals; shape and units as in `Solve`."""
+    return lmfit_minimum(problem.residual, start, problem.low, problem.high)
+
+
+def _descent(problem: Problem, start: FloatArray) -> FloatArray:
     return problem.solve(start).x
 
 
-def scales_solved(problem: Problem, start: FloatArray) -> FloatArray:
-    """The descent, once the linear parameters have been solved for at the start."""
+def _scales_solved(problem: Problem, start: FloatArray) -> FloatArray:
     return problem.solve(with_scales(problem, start)).x
 
 
-def by_differences(problem: Problem, start: FloatArray) -> FloatArray:
-    """The descent with derivatives by central differences."""
-    return replace(problem, model=without_gradient(problem.model)).solve(start).x
+def _by_differences(problem: Problem, start: FloatArray) -> FloatArray:
+    """Descend with derivatives by central differences."""
+    return replace(problem, model=replace(problem.model, gradient_kernel=None)).solve(start).x
 
 
-def trust_region(problem: Problem, start: FloatArray) -> FloatArray:
-    """SciPy's trust-region reflective method with analytic derivatives."""
-    return _least_squares(problem, start, "trf", True)
+def _scipy(
+    problem: Problem, start: FloatArray, *, method: Literal["trf", "dogbox"], analytic: bool = True
+) -> FloatArray:
+    from scipy.optimize import least_squares
+
+    found = least_squares(
+        problem.residual,
+        start,
+        jac=problem.jacobian if analytic else "2-point",
+        bounds=(problem.low, problem.high),
+        method=method,
+        x_scale=problem.high - problem.low,
+    )
+    return np.asarray(found.x)
 
 
-def trust_region_differences(problem: Problem, start: FloatArray) -> FloatArray:
-    """SciPy's trust-region reflective method, derivatives by its own differences."""
-    return _least_squares(problem, start, "trf", False)
-
-
-def dogbox(problem: Problem, start: FloatArray) -> FloatArray:
-    """SciPy's dogleg in boxes with analytic derivatives."""
-    return _least_squares(problem, start, "dogbox", True)
-
-
-def simplex(problem: Problem, start: FloatArray) -> FloatArray:
-    """Nelder and Mead's simplex on chi2: no derivatives at all."""
+def _simplex(problem: Problem, start: FloatArray) -> FloatArray:
+    """Nelder and Mead's simplex on chi2, without derivatives."""
     from scipy.optimize import Bounds, minimize
 
     span = problem.high - problem.low
@@ -122,215 +105,130 @@ def simplex(problem: Problem, start: FloatArray) -> FloatArray:
     return np.asarray(problem.low + found.x * span)
 
 
-def by_lmfit(problem: Problem, start: FloatArray) -> FloatArray:
-    """lmfit's default, on the same residuals."""
-    return lmfit_minimum(problem.residual, start, problem.low, problem.high)
+_ANALYTIC = "analytic derivatives"
+_TRF, _DOGBOX = partial(_scipy, method="trf"), partial(_scipy, method="dogbox")
 
-
-METHODS: tuple[Method, ...] = (
+METHODS: tuple[Method[Solve], ...] = (
     Method(
-        "program", "grid, scales solved", as_the_program, True, own_starts=True,
-        note="analytic derivatives; starts are found, not asked for",
+        "program", "grid, scales solved", program_fit, default=True, own_starts=True,
+        note=f"{_ANALYTIC}; starts are found, not given",
     ),
-    Method("program", "start, scales solved", scales_solved, note="analytic derivatives"),
-    Method("program", "descent", descent, note="analytic derivatives, all parameters searched"),
-    Method("program", "descent, differences", by_differences, note="central differences"),
-    Method("SciPy", "trf", trust_region, note="analytic derivatives"),
-    Method("SciPy", "trf, differences", trust_region_differences, note="forward differences"),
-    Method("SciPy", "dogbox", dogbox, note="analytic derivatives"),
-    Method("SciPy", "simplex", simplex, note="no derivatives"),
+    Method("program", "start, scales solved", _scales_solved, note=_ANALYTIC),
+    Method("program", "descent", _descent, note=f"{_ANALYTIC}, all parameters searched"),
+    Method("program", "descent, differences", _by_differences, note="central differences"),
+    Method("SciPy", "trf", _TRF, note=_ANALYTIC),
+    Method("SciPy", "trf, differences", partial(_TRF, analytic=False), note="forward differences"),
+    Method("SciPy", "dogbox", _DOGBOX, note=_ANALYTIC),
+    Method("SciPy", "simplex", _simplex, note="no derivatives"),
 )  # fmt: skip
 
 
-def methods() -> tuple[Method, ...]:
-    """All methods that can be measured here."""
+def methods() -> tuple[Method[Solve], ...]:
+    """Return all methods that can be measured here."""
     if installed("lmfit") is None:
         return METHODS
-    return (*METHODS, Method("another program", "lmfit", by_lmfit, peer=True, note="leastsq"))
-
-
-def with_scales(problem: Problem, start: FloatArray) -> FloatArray:
-    """The start with its scales from bounded linear least squares, the others as they are."""
-    scales = [i for i, p in enumerate(problem.model.parameters) if p.scale]
-    none = start.copy()
-    none[scales] = 0.0
-    constant = problem.predict(none)
-    columns = []
-    for i in scales:
-        one = none.copy()
-        one[i] = start[i] or problem.high[i] / 2
-        columns.append((problem.predict(one) - constant) / one[i])
-    whiten = problem.covariance.whiten
-    A, b = whiten(np.stack(columns, axis=1)), whiten(problem.brdf - constant)
-    found, _ = bounded_least_squares(A[None], b[None], problem.high[scales])
-    solved = start.copy()
-    solved[scales] = np.maximum(found[0], 1e-3 * problem.high[scales])
-    return solved
-
-
-def without_gradient(model: Model) -> Model:
-    """The model without derivatives of its own: central differences in their place."""
-    return replace(model, gradient_kernel=None)
-
-
-def _least_squares(
-    problem: Problem, start: FloatArray, method: Literal["trf", "dogbox"], analytic: bool
-) -> FloatArray:
-    from scipy.optimize import least_squares
-
-    span = problem.high - problem.low
-    found = least_squares(
-        problem.residual,
-        start,
-        jac=problem.jacobian if analytic else "2-point",
-        bounds=(problem.low, problem.high),
-        method=method,
-        x_scale=span,
-    )
-    return np.asarray(found.x)
-
-
-def scan(name: str, truth: dict[str, float], seed: int) -> Problem:
-    """A scan of 3 incidences and 33 view angles with noise of half a per cent."""
-    theta_i, theta_r = np.repeat([30.0, 45.0, 60.0], 33), np.tile(np.linspace(-80, 80, 33), 3)
-    apart = np.abs(theta_i - theta_r) >= 3  # nearer, camera and lamp hide one another
-    geometry = Geometry.from_degrees(theta_i=theta_i[apart], theta_r=theta_r[apart])
-    true = MODELS[name].brdf(geometry, **truth)
-    noise = np.random.default_rng(seed).standard_normal(true.size)
-    covariance = Covariance(np.square(NOISE * true), np.zeros((true.size, 0)))
-    return Problem(MODELS[name], geometry, true * (1 + NOISE * noise), covariance)
-
-
-def random_starts(problem: Problem, count: int) -> FloatArray:
-    """Starts all over the domain, (count, parameters)."""
-    random = np.random.default_rng(11)
-    return np.asarray(random.uniform(problem.low, problem.high, (count, problem.low.size)))
-
-
-@dataclass(frozen=True, slots=True)
-class Optimum:
-    """The deepest minimum of a scan, and the root of the matrix that measures distances in u."""
-
-    x: FloatArray
-    per_u: FloatArray
-
-    def distance_u(self, x: FloatArray) -> float:
-        """How far off, in standard uncertainties along the worst direction."""
-        if not np.all(np.isfinite(x)):
-            return math.inf
-        return float(np.linalg.norm(self.per_u @ (x - self.x)))
-
-
-def optimum(problem: Problem, count: int = 12) -> Optimum:
-    """The deepest of many descents, from the grid and from random starts, as far as they go."""
-    begin = [*starting_values(problem, _GRID_STARTS), *random_starts(problem, count)]
-    ends = [problem.solve(with_scales(problem, x), rtol=_TIGHT) for x in begin]
-    best = min(ends, key=lambda m: m.chi2)
-    best = problem.solve(best.x, rtol=_TIGHT)
-    return Optimum(best.x, np.linalg.qr(problem.jacobian(best.x)).R)
+    return (*METHODS, Method("another program", "lmfit", lmfit_fit, peer=True, note="leastsq"))
 
 
 def fit_studies(effort: Effort) -> tuple[Study, Study]:
-    """All methods in all scenes: how near they come, and how often they miss."""
+    """Compare all methods in all scenes: distance from the optimum, and starts that miss it."""
     near = _near(effort)
     return near, _misses(near)
 
 
+def _near(effort: Effort) -> Study:
+    name, trials = "fit", list[Trial]()
+    for scene in SCENES:
+        problems = [noisy_scan(scene, seed) for seed in range(effort.data_sets)]
+        best = [optimum(problem) for problem in problems]
+        trials += [_trial(name, scene.name, m, problems, best, effort.starts) for m in methods()]
+    return Study(
+        name=name,
+        title="Fit: solver, derivatives, and linear parameters solved for or searched",
+        cost_axis="time per fit (ms)",
+        error_axis="distance from the optimum (u), worst",
+        caption=_near_caption(trials),
+        truth=f"deepest minimum of many descents; {effort.starts} random starts over the whole "
+        f"domain, {effort.data_sets} noisy scans; results further off than {MISSED_U:g} u are "
+        "misses and do not count for the worst",
+        trials=tuple(trials),
+    )
+
+
+def _near_caption(trials: Sequence[Trial]) -> str:
+    own, others = select(trials, default=True), [t for t in trials if t.peer]
+    times = ", ".join(rounded(t.cost) for t in own)
+    peers = f"; lmfit takes {', '.join(rounded(t.cost) for t in others)} ms" if others else ""
+    return (
+        f"The program takes {times} ms with 2, 3 and 5 parameters, including its search for a start"
+        f"{peers}.\nEvery solver that converges ends far closer than one standard uncertainty: "
+        "solvers differ in their time and in the misses of the next chart, not in the last digits."
+    )
+
+
 def _misses(near: Study) -> Study:
-    """The same fits with the part of starts that miss the optimum as the error."""
+    """Return the same fits with the fraction of starts that miss the optimum as the error."""
     name = "fit_misses"
     parts = [t.failures / t.attempts for t in near.trials]
-    trials = [
+    trials = tuple(
         replace(t, study=name, error=part, error_median=part)
         for t, part in zip(near.trials, parts, strict=True)
-    ]
-    return Study(
-        name,
-        "Fit: which solver misses the optimum",
-        near.cost_axis,
-        "part of the starts that miss it",
-        _missed_caption(trials),
-        near.truth,
-        tuple(trials),
+    )
+    return replace(
+        near,
+        name=name,
+        title="Fit: which solver misses the optimum",
+        error_axis="part of the starts that miss it",
+        caption=_misses_caption(trials),
+        trials=trials,
         error_is="part missed",
     )
 
 
-def _missed_caption(trials: Sequence[Trial]) -> str:
-    own = [t for t in trials if t.default]
-    hardest = [t for t in trials if t.scene == SCENES[-1][0] and not t.default]
+def _misses_caption(trials: Sequence[Trial]) -> str:
+    own = select(trials, default=True)
+    hardest = select(trials, scene=SCENES[-1].name, default=False)
     words = [f"{t.label} {percent(t.error)}" for t in hardest]
     return (
-        f"With starts of its own the program misses {sum(t.failures for t in own)} of "
-        f"{sum(t.attempts for t in own)} scans.\nFrom random starts all over the domain, with 5 "
-        f"parameters, miss: {', '.join(words)}."
-    )
-
-
-def _near(effort: Effort) -> Study:
-    name, trials = "fit", list[Trial]()
-    for scene, model, truth in SCENES:
-        problems = [scan(model, truth, seed) for seed in range(effort.data_sets)]
-        best = [optimum(problem) for problem in problems]
-        trials += [_trial(name, scene, m, problems, best, effort.starts) for m in methods()]
-    return Study(
-        name,
-        "Fit: solver, derivatives, and linear parameters solved for or searched",
-        "time per fit (ms)",
-        "distance from the optimum (u), worst",
-        _caption(trials),
-        f"deepest minimum of many descents; {effort.starts} random starts over the whole domain, "
-        f"{effort.data_sets} noisy scans; further off than {MISSED_U:g} u is a miss and not among "
-        "the worst",
-        tuple(trials),
-    )
-
-
-def _caption(trials: Sequence[Trial]) -> str:
-    own = [t for t in trials if t.default]
-    others = [t for t in trials if t.peer]
-    times = ", ".join(rounded(t.cost) for t in own)
-    peers = f"; lmfit takes {', '.join(rounded(t.cost) for t in others)} ms" if others else ""
-    return (
-        f"The program takes {times} ms with 2, 3 and 5 parameters, its search for a start included"
-        f"{peers}.\nWhoever arrives is far nearer than one standard uncertainty: a solver’s worth "
-        "shows in its time and in the misses of the next chart, not in its last digits."
+        f"With its own starts the program misses {sum(t.failures for t in own)} of "
+        f"{sum(t.attempts for t in own)} scans.\nFrom random starts over the whole domain, with 5 "
+        f"parameters, the part that misses is: {', '.join(words)}."
     )
 
 
 def _trial(
     study: str,
     scene: str,
-    method: Method,
+    method: Method[Solve],
     problems: list[Problem],
     best: list[Optimum],
     count: int,
 ) -> Trial:
     begin = random_starts(problems[0], len(problems) if method.own_starts else count)
+    method.call(problems[0], begin[0])  # first imports are not part of the cost
     seconds, distances = [], []
-    method.solve(problems[0], begin[0])  # imports are nobody's cost
     for n, start in enumerate(begin):
         at = n % len(problems)
         begun = time.process_time()
-        try:
-            x = method.solve(problems[at], start)
-        except (ValueError, ArithmeticError, np.linalg.LinAlgError):
-            x = np.full_like(start, np.nan)  # a solver that gives up has missed
+        x = _solved(method.call, problems[at], start)
         seconds.append(time.process_time() - begun)
         distances.append(best[at].distance_u(x))
     off = np.array(distances)
     arrived = off[off <= MISSED_U]
-    return Trial(
+    return method.trial(
         study,
         scene,
-        method.series,
-        method.label,
-        1e3 * float(np.median(seconds)),
-        float(np.max(arrived, initial=0.0)) if arrived.size else math.inf,
-        float(np.median(off)),
-        method.default,
-        method.peer,
+        cost=1e3 * float(np.median(seconds)),
+        error=float(np.max(arrived)) if arrived.size else math.inf,
+        error_median=float(np.median(off)),
         failures=int(np.sum(off > MISSED_U)),
         attempts=off.size,
-        note=method.note,
     )
+
+
+def _solved(solve: Solve, problem: Problem, start: FloatArray) -> FloatArray:
+    """Return the solver's result; NaN if it gave up, which counts as a miss."""
+    try:
+        return solve(problem, start)
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError):
+        return np.full_like(start, np.nan)

@@ -1,8 +1,8 @@
-"""What the reflectance methods are measured against: the printed formulas by other mathematics.
+"""Reference values of the reflectance: the printed formulas by other numerical methods.
 
 Rough diffuse surface: (31) of 1995 over the printed facets (28), adaptively in the slope and by
-double-exponential nodes in the azimuth; the program's own integral is in closed form there.
-Wolff: H from Chandrasekhar's integral equation, by iteration; the program has H as a definite
+double-exponential nodes in the azimuth; there the program's own integral is in closed form.
+Wolff: H from Chandrasekhar's integral equation by iteration; the program computes H as a definite
 integral. F from the textbook's amplitudes. Beckmann: the sum (77) of 1991 in 40 decimal digits.
 
 Sources: M. Oren, S. K. Nayar, IJCV 14 (1995); S. Chandrasekhar, Radiative Transfer (Dover 1960),
@@ -29,9 +29,9 @@ _AZIMUTHS = 80  # nodes between two kinks
 
 
 def rough_surface(geometry: Geometry, albedo: float, sigmas_deg: Sequence[float]) -> FloatArray:
-    """BRDF in 1/sr of the Gaussian V-cavity surface, shape (sigmas, geometries).
+    """Return the BRDF in 1/sr of the Gaussian V-cavity surface, shape (sigmas, geometries).
 
-    About half a second a geometry, for all sigmas together.
+    Takes about half a second per geometry, for all sigmas together.
     """
     angles = (geometry.theta_i.ravel(), geometry.theta_r.ravel(), geometry.dphi_deg.ravel())
     sigmas = np.radians(np.asarray(sigmas_deg, dtype=np.float64))
@@ -44,7 +44,7 @@ def rough_surface(geometry: Geometry, albedo: float, sigmas_deg: Sequence[float]
 
 
 def _gaussian_mean(theta_i: float, theta_r: float, dphi: float, sigmas: FloatArray) -> FloatArray:
-    """(31): mean over the slopes of light of one bounce and of two, (2, sigmas)."""
+    """(31): mean over the slopes of one-bounce and two-bounce light, (2, sigmas)."""
     from scipy.integrate import quad_vec
 
     larger, smaller = (np.array([f(theta_i, theta_r)]) for f in (max, min))
@@ -75,7 +75,7 @@ def _azimuthal_mean(theta_i: float, theta_r: float, dphi: float, theta_a: float)
 
 
 def _azimuth_kinks(theta_i: float, theta_r: float, dphi: float, theta_a: float) -> FloatArray:
-    """Where shadowing or masking set in (39), or become equally wide; rising over half a circle."""
+    """Azimuths where shadowing or masking sets in (39), or both are equally wide; ascending."""
     shadow, mask = (
         float(critical_angle(np.array(t), np.array(theta_a))) for t in (theta_i, theta_r)
     )
@@ -86,7 +86,7 @@ def _azimuth_kinks(theta_i: float, theta_r: float, dphi: float, theta_a: float) 
 
 
 def _double_exponential(nodes: int) -> tuple[FloatArray, FloatArray]:
-    """Nodes from -1 to 1 and weights, drawn to the ends: any algebraic singularity there is met.
+    """Nodes from -1 to 1 and weights, dense at the ends to resolve algebraic singularities there.
 
     H. Takahasi, M. Mori, Publications of RIMS, Kyoto University 9 (1974).
     """
@@ -99,7 +99,7 @@ def _double_exponential(nodes: int) -> tuple[FloatArray, FloatArray]:
 
 
 def wolff(geometry: Geometry, rho: float, n: float) -> FloatArray:
-    """BRDF in 1/sr of (7) with (8), exact H and F; a vector of geometries."""
+    """Return the BRDF in 1/sr of (7) with (8), exact H and F; geometries and result are (N,)."""
     cos_i, cos_r = np.cos(geometry.theta_i), np.cos(geometry.theta_r)
     mu_i, mu_r = (np.sqrt(1 - (1 - np.square(c)) / n**2) for c in (cos_i, cos_r))
     x, weight, reflected = _inner_hemisphere(n)
@@ -111,9 +111,9 @@ def wolff(geometry: Geometry, rho: float, n: float) -> FloatArray:
 
 
 def _inner_hemisphere(n: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Cosines inside, their weights times x, and the interface's reflectance there.
+    """Return cosines inside, their weights times x, and the interface's reflectance there.
 
-    Total reflection up to the critical angle; beyond it, nodes in the cosine outside.
+    Total reflection up to the critical cosine; above it, nodes in the cosine outside.
     """
     t, w = np.polynomial.legendre.leggauss(80)
     t, w = (t + 1) / 2, w / 2
@@ -138,7 +138,7 @@ def _chandrasekhar_h(mu: FloatArray, rho: float) -> FloatArray:
     for _ in range(400):
         new = 1 / (math.sqrt(1 - rho) + kernel @ h)
         settled = np.max(np.abs(new / h - 1)) < 1e-14
-        h = (new + h) / 2  # the plain iteration swings about the solution
+        h = (new + h) / 2  # undamped, the iteration oscillates about the solution
         if settled:
             break
     inner = (1 / (x + mu[:, None])) @ (weight * x * h)
@@ -146,7 +146,7 @@ def _chandrasekhar_h(mu: FloatArray, rho: float) -> FloatArray:
 
 
 def _fresnel(cosine: FloatArray, n: float) -> FloatArray:
-    """Reflectance of natural light from outside: the mean of the two squared amplitudes."""
+    """Reflectance of unpolarised light from outside: the mean of the two squared amplitudes."""
     inside = np.sqrt(1 - (1 - np.square(cosine)) / n**2)
     across = (cosine - n * inside) / (cosine + n * inside)
     along = (n * cosine - inside) / (n * cosine + inside)
@@ -157,7 +157,7 @@ def _fresnel(cosine: FloatArray, n: float) -> FloatArray:
 
 
 def beckmann(geometry: Geometry, sigma_h: float, correlation_length: float) -> FloatArray:
-    """BRDF in 1/sr of the lobe of (77) over (80), scale 1; lengths in wavelengths."""
+    """Return the BRDF, (N,) in 1/sr, of (77) over (80), scale 1; lengths in wavelengths."""
     theta_i, theta_r = geometry.theta_i.ravel(), geometry.theta_r.ravel()
     phi = np.radians(geometry.dphi_deg.ravel())
     lengths = (sigma_h, correlation_length)
@@ -174,7 +174,7 @@ def _lobe(theta_i: float, theta_r: float, dphi: float, sigma_h: float, T: float)
 
 
 def _long_sum(g: float, q: float) -> float:
-    """e^-g sum over m of g^m/(m! m) e^(-q/m), in 40 digits, until terms no longer count."""
+    """e^-g sum over m of g^m/(m! m) e^(-q/m), in 40 digits, until terms are negligible."""
     with localcontext() as digits:
         digits.prec = 40
         big_g, big_q = Decimal(g), Decimal(q)

@@ -1,29 +1,31 @@
-"""What a scan's settings cost and bring: minutes on the bench against the error of the parameters.
+"""Scan settings: time on the bench against the error of the fitted parameters.
 
-The whole program measures a simulated sample, whose parameters are known, with many seeds: other
-noise, other errors of angles, tile and placing. Beside it stand two limits for any unbiased method
-(Cramer and Rao): what the photons allow, and what all stated uncertainties allow.
+The whole program measures a simulated sample of known parameters with many seeds: each has its own
+noise and its own errors of angles, tile and placement. Two lower limits (Cramer and Rao) for any
+unbiased method stand beside it: one from photon noise alone, one from all stated uncertainties.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from contextlib import closing
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from acquisition.benchmark.demo_scan import BINNING, demonstration
+from acquisition.benchmark.demo_scan import BINNING, demonstration, view_step_deg
 from acquisition.benchmark.effort import Effort
 from acquisition.benchmark.number_text import percent, rounded
+from acquisition.benchmark.studies.method import rms_and_median
 from acquisition.benchmark.study import Study
-from acquisition.benchmark.trial import Trial
+from acquisition.benchmark.trial import Trial, select
 from acquisition.engine.engine import Engine
 from acquisition.measure.window import window_at
 from acquisition.plan.exposure_ladder import longest_exposure_s
-from acquisition.plan.plan import Plan, Step, make_plan
+from acquisition.plan.plan import Plan, make_plan
 from acquisition.results.fitting import measurements
 from acquisition.results.reduction import reduced_run
 from acquisition.rig import open_devices
@@ -33,22 +35,22 @@ from analysis.fit.fit import fit, stated_u
 from analysis.fit.problem import Problem
 from analysis.models import MODELS
 from instrument.config.load import Loaded
+from instrument.config.protocol import SimulatedSample
 from instrument.geometry import FloatArray, Geometry
 from instrument.pinhole import Pinhole
 from instrument.record.record import Record
 
-NAMES = ("sigma_deg", "albedo")
 _OWN, _PHOTONS, _STATED = "demonstration", "photons", "u_stated_relative"
 _WORDS = {"sigma_deg": "roughness σ", "albedo": "albedo"}
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """View angles of an incidence, frames of a point, exposure as a part of full scale."""
+    """View angles per incidence, frames per point, exposure target; None: as in the demo."""
 
-    views: int = 33
-    frames: int = 4
-    exposure_target: float = 0.7
+    views: int | None = None
+    frames: int | None = None
+    exposure_target: float | None = None
 
 
 DEFAULT = Settings()
@@ -60,77 +62,84 @@ _QUICK = VIEWS[1:2], FRAMES[:1], TARGETS[:1]
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Errors of the parameters relative to the truth (seeds, NAMES), and the relative u stated."""
+    """Errors of the parameters relative to the truth and the stated relative u.
+
+    Both are (seeds, parameters), in the order of `_WORDS`.
+    """
 
     errors: FloatArray
     stated: FloatArray
 
 
 def variants(thorough: bool) -> list[tuple[str, str, Settings]]:
-    """Series, label and settings: the demonstration, and one setting changed at a time."""
+    """Return series, label and settings: the demonstration, then one setting changed at a time."""
     views, frames, targets = (VIEWS, FRAMES, TARGETS) if thorough else _QUICK
-    found = [(_OWN, _OWN, DEFAULT)]
-    found += [("step", f"step {160 / (n - 1):g}°", replace(DEFAULT, views=n)) for n in views]
-    found += [("frames", f"{n} frame{'s' * (n > 1)}", replace(DEFAULT, frames=n)) for n in frames]
-    found += [
-        ("exposure", f"exposed to {t:.0%}", replace(DEFAULT, exposure_target=t)) for t in targets
+    return [
+        (_OWN, _OWN, DEFAULT),
+        *(("step", f"step {view_step_deg(n):g}°", Settings(views=n)) for n in views),
+        *(("frames", f"{n} frame{'s' * (n > 1)}", Settings(frames=n)) for n in frames),
+        *(("exposure", f"exposed to {t:.0%}", Settings(exposure_target=t)) for t in targets),
     ]
-    return found
 
 
 def scan_study(effort: Effort) -> Study:
-    """All settings, each with as many seeds."""
+    """Compare all settings, each with the same number of seeds."""
     trials: list[Trial] = []
     with TemporaryDirectory(prefix="gonio-bench-") as folder:
         for series, label, settings in variants(effort.thorough):
             found = simulated(settings, effort.seeds, Path(folder) / label)
             trials += _trials(series, label, settings, found)
     return Study(
-        "scan",
-        "Scan: what more angles, frames and light bring",
-        "time on the bench (minutes)",
-        "relative error, rms over scans",
-        _caption(trials),
-        f"the simulated sample’s own parameters, {effort.seeds} scans of each setting (an rms "
-        f"good to {percent(1 / math.sqrt(2 * effort.seeds))}), pixels binned {BINNING} × "
+        name="scan",
+        title="Scan: what more angles, frames and light bring",
+        cost_axis="time on the bench (minutes)",
+        error_axis="relative error, rms over scans",
+        caption=_caption(trials),
+        truth=f"the simulated sample’s own parameters, {effort.seeds} scans of each setting (an "
+        f"rms good to {percent(1 / math.sqrt(2 * effort.seeds))}), pixels binned {BINNING} × "
         f"{BINNING}; limits after Cramér and Rao",
-        tuple(trials),
+        trials=tuple(trials),
         error_is="rms",
     )
 
 
 def _caption(trials: Sequence[Trial]) -> str:
-    own = {t.scene: t for t in trials if t.default}
-    limit = {t.scene: t.error for t in trials if t.bound and t.label == f"{_PHOTONS}: {_OWN}"}
-    stated = {scene: t.more[_STATED] for scene, t in own.items()}
+    own = {t.scene: t for t in select(trials, default=True)}
+    photons = {t.scene: t.error for t in select(trials, label=f"{_PHOTONS}: {_OWN}")}
     reached = ", ".join(
-        f"{percent(u)} for the {scene} ({rounded(u / limit[scene])} times what photons allow)"
-        for scene, u in stated.items()
+        f"{percent(t.more[_STATED])} for the {scene} "
+        f"({rounded(t.more[_STATED] / photons[scene])} times the photon limit)"
+        for scene, t in own.items()
     )
-    rough = _ends([t for t in trials if t.scene == _WORDS["sigma_deg"] and not t.bound])
+
+    def others(parameter: str) -> list[tuple[Trial, float]]:
+        """Trials of other settings, and their stated u in units of the demonstration's."""
+        scene = _WORDS[parameter]
+        found = [t for t in select(trials, scene=scene, default=False) if not t.bound]
+        return [(t, t.more[_STATED] / own[scene].more[_STATED]) for t in found]
+
+    ends = _ends([t for t, _ in others("sigma_deg")])
     words = ", ".join(
-        f"{t.label} {rounded(t.more[_STATED] / stated[t.scene])} times in {rounded(t.cost)} min"
-        for t in rough
+        f"{t.label} {rounded(ratio)} times in {rounded(t.cost)} min"
+        for t, ratio in others("sigma_deg")
+        if t in ends
     )
-    albedo = [t for t in trials if t.scene == _WORDS["albedo"] and not t.bound and not t.default]
-    ratios = [t.more[_STATED] / stated[t.scene] for t in albedo]
+    ratios = [ratio for _, ratio in others("albedo")]
     change = f"{rounded(min(ratios))} to {rounded(max(ratios))}"
-    minutes = next(iter(own.values())).cost
+    minutes = own[_WORDS["sigma_deg"]].cost
     return (
-        f"The demonstration states {reached}, in {rounded(minutes)} minutes. The albedo’s u is "
-        f"shared by all points (tile, lamp, placing): other settings make it {change} times as "
-        f"large.\nThe roughness has, against that, a stated u of: {words}."
+        f"The demonstration states a u of {reached}, in {rounded(minutes)} minutes. The albedo’s u "
+        "is mostly shared by all points (tile, lamp, placement): other settings change it to only "
+        f"{change} times.\nThe roughness’s stated u, in comparison: {words}."
     )
 
 
 def _ends(trials: Sequence[Trial]) -> list[Trial]:
-    """Of each series the cheapest and the dearest, without the default."""
-    others = [t for t in trials if not t.default]
+    """Return the cheapest and the most expensive trial of each series."""
     ends: list[Trial] = []
-    for series in dict.fromkeys(t.series for t in others):
-        own = [t for t in others if t.series == series]
-        found = (min(own, key=lambda t: t.cost), max(own, key=lambda t: t.cost))
-        ends += [t for t in own if t in found]
+    for series in dict.fromkeys(t.series for t in trials):
+        own = sorted((t for t in trials if t.series == series), key=lambda t: t.cost)
+        ends += [own[0], own[-1]]
     return ends
 
 
@@ -140,48 +149,38 @@ def simulated(settings: Settings, seeds: int, folder: Path) -> Found:
     for seed in range(1, seeds + 1):
         loaded = demonstration(**asdict(settings), seed=seed)
         values, u = _once(loaded, folder / str(seed))
-        truth = _truth(loaded)
-        errors.append([values[name] / truth[name] - 1 for name in NAMES])
-        stated.append([u[name] / truth[name] for name in NAMES])
+        truth = _sample(loaded).parameters
+        errors.append([values[name] / truth[name] - 1 for name in _WORDS])
+        stated.append([u[name] / truth[name] for name in _WORDS])
     return Found(np.array(errors), np.array(stated))
 
 
-def _truth(loaded: Loaded) -> dict[str, float]:
+def _sample(loaded: Loaded) -> SimulatedSample:
     sample = loaded.protocol.simulated_sample
     if sample is None:
-        raise ValueError("the demonstration has no simulated sample; allowed: one with parameters")
-    return sample.parameters
+        raise ValueError(f"{loaded.protocol_path}: simulated_sample is missing; required here")
+    return sample
 
 
 def _once(loaded: Loaded, folder: Path) -> tuple[dict[str, float], dict[str, float]]:
-    """Parameters and their u from one simulated scan by the program's own engine."""
-    sample = loaded.protocol.simulated_sample
-    model = MODELS[sample.model if sample is not None else ""]
-    devices = open_devices(loaded)
-    try:
-        with Record.create(folder, {}) as record:
-            engine = Engine(loaded.protocol, loaded.rig, devices, record, _nothing)
-            engine.run(make_plan(loaded))
-            reduced = reduced_run(record, loaded)
-    finally:
-        devices.close()
+    """Return parameters and their u from one simulated scan by the program's own engine."""
+    with closing(open_devices(loaded)) as devices, Record.create(folder, {}) as record:
+        engine = Engine(loaded.protocol, loaded.rig, devices, record, lambda _: None)
+        engine.run(make_plan(loaded))
+        reduced = reduced_run(record, loaded)
     points = measurements(reduced, loaded)
+    model = MODELS[_sample(loaded).model]
     found = fit(model, points, Acceptance.of(loaded.rig, loaded.protocol.window))
     return dict(found.values), stated_u(found, points)
 
 
-def _nothing(step: Step) -> None:
-    """What is told of every step, and needs no word here."""
-
-
 def photon_limit(loaded: Loaded, plan: Plan) -> dict[str, float]:
-    """Least u of the parameters that photon and read noise allow, by Cramer and Rao.
+    """Return the least u of the parameters allowed by photon and read noise (Cramer and Rao).
 
-    The inverse of the Fisher information J^T C^-1 J, J the model's derivatives, C the variance of
-    the electrons that the plan's exposures collect in the window.
+    The inverse of the Fisher information J^T C^-1 J, with J the derivatives of the model and C the
+    variance of the electrons that the plan's exposures collect in the window.
     """
-    sample = loaded.protocol.simulated_sample
-    model, truth = MODELS[sample.model if sample is not None else ""], _truth(loaded)
+    model, truth = MODELS[_sample(loaded).model], _sample(loaded).parameters
     poses = [step.pose for step in plan.points]
     geometry = Geometry.from_degrees(
         theta_i=[p.theta_i for p in poses],
@@ -197,7 +196,7 @@ def photon_limit(loaded: Loaded, plan: Plan) -> dict[str, float]:
 
 
 def _noise(brdf: FloatArray, geometry: Geometry, loaded: Loaded, plan: Plan) -> FloatArray:
-    """Relative noise of every point from the electrons in its window."""
+    """Relative noise of every point, from the electrons in its window."""
     camera, protocol = loaded.rig.camera, loaded.protocol
     per_s = loaded.rig.lamp.white_electrons_per_s * np.pi * brdf * np.cos(geometry.theta_i)
     wanted = protocol.exposure_target * camera.full_well_electrons / per_s
@@ -215,29 +214,34 @@ def _noise(brdf: FloatArray, geometry: Geometry, loaded: Loaded, plan: Plan) -> 
 def _trials(series: str, label: str, settings: Settings, found: Found) -> list[Trial]:
     loaded = demonstration(**asdict(settings))
     plan = make_plan(loaded)
-    minutes, truth, limit = plan.duration_s / 60, _truth(loaded), photon_limit(loaded, plan)
+    truth, photons = _sample(loaded).parameters, photon_limit(loaded, plan)
     trials: list[Trial] = []
-    for column, name in enumerate(NAMES):
+    for column, (name, scene) in enumerate(_WORDS.items()):
         errors, stated = found.errors[:, column], float(np.median(found.stated[:, column]))
-        scene = _WORDS[name]
-        more = {
-            "bias_relative": float(errors.mean()),
-            "u_bias_relative": float(errors.std(ddof=1) / math.sqrt(errors.size)),
-            _STATED: stated,
-            "geometries": float(len(plan.points)),
-        }
-        trials.append(
-            Trial(
-                "scan", scene, series, label, minutes,
-                float(np.sqrt(np.mean(errors**2))), float(np.median(np.abs(errors))),
-                default=settings == DEFAULT, more=more,
-            )
-        )  # fmt: skip
-        for what, value in ((_PHOTONS, limit[name] / truth[name]), ("all parts of u", stated)):
-            trials.append(
-                Trial(
-                    "scan", scene, f"limit: {what}", f"{what}: {label}", minutes, value, value,
-                    bound=True,
-                )
-            )  # fmt: skip
+        own = Trial(
+            study="scan",
+            scene=scene,
+            series=series,
+            label=label,
+            cost=plan.duration_s / 60,
+            default=settings == DEFAULT,
+            more={
+                "bias_relative": float(errors.mean()),
+                "u_bias_relative": float(errors.std(ddof=1) / math.sqrt(errors.size)),
+                _STATED: stated,
+                "geometries": float(len(plan.points)),
+            },
+            **rms_and_median(errors),
+        )
+        limits = {_PHOTONS: photons[name] / truth[name], "all parts of u": stated}
+        trials += [own, *(_limit(own, what, value) for what, value in limits.items())]
     return trials
+
+
+def _limit(trial: Trial, what: str, value: float) -> Trial:
+    """Return a limit to a trial's error, at the same cost."""
+    return Trial(
+        study=trial.study, scene=trial.scene, series=f"limit: {what}",
+        label=f"{what}: {trial.label}", cost=trial.cost, error=value, error_median=value,
+        bound=True,
+    )  # fmt: skip

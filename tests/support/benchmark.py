@@ -1,0 +1,65 @@
+"""Made-up trials, studies and a result of a benchmark, and the effort of a short real one."""
+
+from __future__ import annotations
+
+import math
+
+from acquisition.benchmark.effort import Effort
+from acquisition.benchmark.output.charts import MAIN
+from acquisition.benchmark.result import BenchmarkResult
+from acquisition.benchmark.study import Study
+from acquisition.benchmark.trial import Trial
+
+FEW = Effort(
+    name="test", truths=2, batch=512, repeats=3, frame_views=3, starts=4, data_sets=1, seeds=2,
+    draws=20, thorough=False,
+)  # fmt: skip
+
+
+def trial(study: str, scene: str, label: str, cost: float, error: float, **more: object) -> Trial:
+    """A trial whose median error is a third of its error."""
+    typical = error / 3 if math.isfinite(error) else error
+    return Trial(
+        study=study, scene=scene, series="kind", label=label, cost=cost, error=error,
+        error_median=typical,
+        **more,  # type: ignore[arg-type]  # keywords of Trial
+    )  # fmt: skip
+
+
+def study(name: str) -> Study:
+    """Two scenes; a default, a peer, a limit, a method without a result and one without error."""
+    trials = []
+    for scene in ("calm", "rough <&>"):
+        trials += [
+            trial(name, scene, "cheap", 1.0, 0.5, note="quick & coarse"),
+            trial(name, scene, "usual", 10.0, 1e-3, default=True, more={"u_relative": 0.25}),
+            trial(name, scene, "theirs", 12.0, 2e-3, peer=True, failures=1, attempts=4),
+            trial(name, scene, "fails", 20.0, math.inf),
+            trial(name, scene, "flawless", 500.0, 0.0),
+            trial(name, scene, "limit", 10.0, 1e-4, bound=True),
+        ]
+    return Study(
+        name=name,
+        title=f"Title of {name}: why",
+        cost_axis="time (ms)",
+        error_axis="bias (relative)",
+        caption="First line.\nSecond <line>.",
+        truth="a truth",
+        trials=tuple(trials),
+    )
+
+
+def result() -> BenchmarkResult:
+    """The studies of the main chart and one more."""
+    return BenchmarkResult(
+        effort="test",
+        seconds=12.0,
+        machine={"processor": "a processor", "cores": "2", "Python": "3.11.0", "date": "today"},
+        peers=("lmfit 1.0: the fit", "Mitsuba: not installed"),
+        studies=tuple(map(study, [*(name for name, _ in MAIN), "bits"])),
+    )
+
+
+def worst(study: Study, label: str) -> float:
+    """The largest error of a method over all scenes."""
+    return max(study.trial(scene, label).error for scene in study.scenes)
