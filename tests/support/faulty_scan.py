@@ -1,4 +1,4 @@
-"""A scan in which something fails at a chosen call: what the tests of faults share."""
+"""Scans in which a device or the disk fails at a chosen call, for the tests of faults."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from tests.support.scans import undated
 Trigger = tuple[When, str, int]
 
 
-class Watched(Record):
-    """A record whose acceptance of a reading is a moment as well, and whose disk can fail."""
+class WatchedRecord(Record):
+    """Record whose `add_reading` counts as a device call, and whose disk can fail."""
 
     triggers = Triggers()
 
@@ -39,34 +39,37 @@ class Watched(Record):
             super().add_reading(reading, preview, frames, files)
 
     def refuse_writes(self) -> None:
-        """As a disk does that the system has made read-only."""
+        """Refuse writes, like a disk remounted read-only."""
         self._db.execute("PRAGMA query_only = ON")
 
     def fill_disk(self) -> None:
-        """There is room for nothing more."""
+        """Leave no free space."""
         (pages,) = self._db.execute("PRAGMA page_count").fetchone()
         self._db.execute(f"PRAGMA max_page_count = {pages}")
 
 
-class Watching:
-    """Passes all calls on to a device, each of them a moment."""
+class WatchedDevice:
+    """Forwards all calls to a device and counts them."""
 
     def __init__(self, name: str, device: object, triggers: Triggers) -> None:
         self._name, self._device, self._triggers = name, device, triggers
 
     def __getattr__(self, name: str) -> object:
-        found = getattr(self._device, name)
+        method = getattr(self._device, name)
 
-        def called(*arguments: object) -> object:
+        def call(*arguments: object) -> object:
             with self._triggers.call(f"{self._name}.{name}"):
-                return found(*arguments)
+                return method(*arguments)
 
-        return called
+        return call
 
 
 @dataclass(frozen=True)
-class Ended:
-    """How a scan ended: all readings so far, what it raised, its events by kind."""
+class ScanResult:
+    """Outcome of a scan: all readings so far, the error raised, and the events by kind.
+
+    `before`: number of readings that earlier scans had left.
+    """
 
     readings: list[Reading]
     before: int
@@ -77,22 +80,22 @@ class Ended:
 def scan(
     loaded: Loaded,
     folder: Path,
-    opened: Callable[[], Devices],
+    open_rig: Callable[[], Devices],
     triggers: Triggers,
     disk: tuple[str, Trigger] | None = None,
-) -> Ended:
-    """Run, or go on with what is in the folder; `disk`: what happens to it, and when."""
-    known, error = (folder / "record.sqlite").exists(), None
+) -> ScanResult:
+    """Run a scan, or resume the one in the folder. `disk`: a fault of `WatchedRecord`, and when."""
+    exists, error = (folder / "record.sqlite").exists(), None
     with (
-        patch.object(scan_session, "open_devices", lambda _: opened()),
-        Watched.open(folder) if known else Watched.create(folder, {}) as record,
+        patch.object(scan_session, "open_devices", lambda _: open_rig()),
+        WatchedRecord.open(folder) if exists else WatchedRecord.create(folder, {}) as record,
     ):
-        assert isinstance(record, Watched)
+        assert isinstance(record, WatchedRecord)
         record.triggers = triggers
         if disk is not None:
             strike: Action = getattr(record, disk[0])
             triggers.plan(*disk[1], strike)
-        before = Progress.of(record) if known else None
+        before = Progress.of(record) if exists else None
         try:
             scan_session.scan(loaded, make_plan(loaded), record, before)
         except GonioError as raised:
@@ -101,16 +104,18 @@ def scan(
         for _, kind, text in record.events():
             events.setdefault(kind, []).append(text)
         count = len(before.readings) if before else 0
-        return Ended(undated(record.readings()), count, error, events)
+        return ScanResult(undated(record.readings()), count, error, events)
 
 
-def require_named(ended: Ended, error: type[GonioError], says: str, folder: Path) -> None:
-    """The message says what happened and how to go on, the record the same."""
-    text = str(ended.error)
-    assert isinstance(ended.error, error), text
-    assert re.search(says, text), text
+def require_reported(
+    result: ScanResult, error: type[GonioError], pattern: str, folder: Path
+) -> None:
+    """The error message states the cause and how to resume; so does the record."""
+    text = str(result.error)
+    assert isinstance(result.error, error), text
+    assert re.search(pattern, text), text
     assert f"gonio resume {folder}" in text
-    assert ended.error.exit_code == (4 if error is OperatorStop else 3)
-    if error is not StorageError:  # that one cannot be written down
-        (why,) = ended.events["stopped" if error is OperatorStop else "fault"]
-        assert text.startswith(why)
+    assert result.error.exit_code == (4 if error is OperatorStop else 3)
+    if error is not StorageError:  # which cannot be recorded
+        (cause,) = result.events["stopped" if error is OperatorStop else "fault"]
+        assert text.startswith(cause)

@@ -1,12 +1,11 @@
-"""Faults of a V4L2 camera within a scan: recovery or a named stop, never another value.
+"""Faults of a V4L2 camera during a scan: recovery or a clear stop, never a wrong value.
 
-The driver runs in a child process over an emulated camera that looks at the simulated scene; stage,
-lamp and operator are simulated. What the driver logs there is logged here, and so in the record.
+The driver runs in a child process over an emulated camera that renders the simulated scene; stage,
+lamp and operator are simulated. The driver's log messages are logged again here, for the record.
 """
 
 from __future__ import annotations
 
-import copy
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -34,7 +33,7 @@ from sim.faults.triggers import Triggers, When
 from sim.scene.scene import Scene
 from sim.scene.sensor import Sensor
 from tests.support import faulty_scan
-from tests.support.faulty_scan import Ended, Watching, require_named
+from tests.support.faulty_scan import ScanResult, WatchedDevice, require_reported
 from tests.support.paths import CONFIGS
 from tests.support.scans import changed, small_scan
 from tests.support.v4l2.remote_camera import QUICK, SETTINGS, RemoteCamera
@@ -42,18 +41,18 @@ from tests.support.v4l2.remote_camera import QUICK, SETTINGS, RemoteCamera
 pytestmark = pytest.mark.waits
 
 SIZE = (128, 102)
-AT: dict[str, tuple[When, str, int]] = {
+STATES: dict[str, tuple[When, str, int]] = {
     "idle": ("at", "theta_r.identity", 1),
     "moving": ("after", "theta_r.start_move", 3),
     "exposing": ("after", "camera.set_exposure_s", 3),
     "reading": ("at", "camera.series", 2),
 }
-Strike = Callable[[EmulatedCamera], None]
+MakeFail = Callable[[EmulatedCamera], None]
 
 
 @pytest.fixture(scope="module")
 def short() -> Loaded:
-    """Three points, nothing else; the camera is that of the emulated rig, made small."""
+    """A scan of three points only, with the emulated rig's camera at reduced size."""
     demo = CONFIGS / "protocols" / "demo.yaml"
     rig = load_protocol(demo, CONFIGS / "rigs" / "emulated.yaml").rig
     scale = SIZE[0] / rig.camera.width_px
@@ -85,10 +84,10 @@ def settings(loaded: Loaded) -> V4l2Settings:
     )
 
 
-class Relayed:
-    """The camera of the child process; what its driver logs is logged here.
+class RelayedCamera:
+    """Camera of the child process; logs the messages of its driver here.
 
-    More frames than one, asked for at once, are a moment of their own: a series.
+    Calls are counted as `camera.series` for several frames and `camera.single` for one.
     """
 
     def __init__(self, remote: RemoteCamera, triggers: Triggers) -> None:
@@ -96,12 +95,12 @@ class Relayed:
 
     def grab(self, count: int) -> list[Frame]:
         with self._triggers.call("camera.series" if count > 1 else "camera.single"):
-            return self._asked("grab", count)  # type: ignore[no-any-return]  # over a pipe
+            return self._ask("grab", count)  # type: ignore[no-any-return]  # over a pipe
 
     def set_exposure_s(self, exposure_s: float) -> float:
-        return float(self._asked("set_exposure_s", exposure_s))
+        return float(self._ask("set_exposure_s", exposure_s))
 
-    def _asked(self, name: str, argument: float) -> Any:
+    def _ask(self, name: str, argument: float) -> Any:
         try:
             return self._remote.ask(name, argument)
         finally:
@@ -115,8 +114,8 @@ class Relayed:
         return dict(self._remote.ask("settings"))
 
 
-class Looking:
-    """The scene, as the emulated camera sees it: as it was when an exposure began."""
+class SceneRenderer:
+    """Renders the scene as it was at the start of each exposure."""
 
     def __init__(self) -> None:
         self.scene: Scene | None = None
@@ -124,36 +123,34 @@ class Looking:
     def snapshot(self) -> object:
         if self.scene is None:
             return None
-        seen = copy.copy(self.scene)
-        seen.true_deg = dict(self.scene.true_deg)
-        return seen
+        return replace(self.scene, true_deg=dict(self.scene.true_deg))
 
-    def render(self, exposure: Exposure, seen: object) -> NDArray[Any]:
-        """A sensor for each picture: the noise of a step is the same however many were dropped."""
-        if not isinstance(seen, Scene) or len(seen.true_deg) < 3:
+    def render(self, exposure: Exposure, snapshot: object) -> NDArray[Any]:
+        """Use a new sensor for each image: its noise must not depend on dropped frames."""
+        if not isinstance(snapshot, Scene) or len(snapshot.true_deg) < 3:
             return np.zeros((exposure.height_px, exposure.width_px), np.uint16)  # not homed yet
-        return Sensor(seen).picture(exposure.exposure_s)
+        return Sensor(snapshot).picture(exposure.exposure_s)
 
 
 @contextmanager
-def bench(
+def opened_rig(
     loaded: Loaded, remote: RemoteCamera, triggers: Triggers
 ) -> Iterator[tuple[EmulatedCamera, Devices]]:
-    """A new camera, opened, and the devices about it."""
-    looking, faults = Looking(), Faults()
-    camera = EmulatedCamera(looking.render, looking.snapshot, replace(QUICK, sizes=(SIZE,)))
+    """A new emulated camera with its driver open, and the other devices simulated."""
+    renderer, faults = SceneRenderer(), Faults()
+    camera = EmulatedCamera(renderer.render, renderer.snapshot, replace(QUICK, sizes=(SIZE,)))
     simulated = open_devices(changed(loaded, rig={"camera": small_scan().rig.camera}), faults)
     assert faults.scene is not None
     faults.scene.rig = loaded.rig
-    looking.scene = faults.scene
+    renderer.scene = faults.scene
     with V4l2Server(camera, remote.socket):
         remote.ask("open", settings(loaded))
-        watched = Watching("camera", Relayed(remote, triggers), triggers)
+        watched = WatchedDevice("camera", RelayedCamera(remote, triggers), triggers)
         axes = dict(simulated.axes)
-        stage = Watching("theta_r", axes["theta_r"]._stage, triggers)
-        axes["theta_r"] = Axis("theta_r", stage, loaded.rig.axes.theta_r, simulated.clock)  # type: ignore[arg-type]  # passes all on
+        stage = WatchedDevice("theta_r", axes["theta_r"]._stage, triggers)
+        axes["theta_r"] = Axis("theta_r", stage, loaded.rig.axes.theta_r, simulated.clock)  # type: ignore[arg-type]  # forwards everything
         try:
-            yield camera, replace(simulated, axes=axes, camera=watched)  # type: ignore[arg-type]  # passes all on
+            yield camera, replace(simulated, axes=axes, camera=watched)  # type: ignore[arg-type]  # forwards everything
         finally:
             remote.ask("close")
 
@@ -162,49 +159,49 @@ def scan(
     loaded: Loaded,
     remote: RemoteCamera,
     folder: Path,
-    *happening: tuple[tuple[When, str, int], Strike],
-) -> Ended:
+    *planned: tuple[tuple[When, str, int], MakeFail],
+) -> ScanResult:
     triggers = Triggers()
-    with bench(loaded, remote, triggers) as (camera, devices):
-        for moment, strike in happening:
-            triggers.plan(*moment, lambda strike=strike: strike(camera))
-        ended = faulty_scan.scan(loaded, folder, lambda: devices, triggers)
+    with opened_rig(loaded, remote, triggers) as (camera, devices):
+        for trigger, make_fail in planned:
+            triggers.plan(*trigger, lambda make_fail=make_fail: make_fail(camera))
+        result = faulty_scan.scan(loaded, folder, lambda: devices, triggers)
     assert triggers.pending == 0
-    return ended
+    return result
 
 
 @pytest.fixture(scope="module")
 def whole(
     short: Loaded, remote: RemoteCamera, tmp_path_factory: pytest.TempPathFactory
 ) -> list[Reading]:
-    """The readings of a scan in which nothing failed."""
-    ended = scan(short, remote, tmp_path_factory.mktemp("whole") / "run")
-    assert ended.error is None
-    assert all(reading.peak_dn > 1000 for reading in ended.readings)
-    return ended.readings
+    """Readings of the undisturbed scan."""
+    result = scan(short, remote, tmp_path_factory.mktemp("whole") / "run")
+    assert result.error is None
+    assert all(reading.peak_dn > 1000 for reading in result.readings)
+    return result.readings
 
 
-def spoil_one(kind: BadFrame) -> Strike:
-    """A frame that counts: those that were waiting when it was asked for have been dropped."""
+def one_bad_frame(kind: BadFrame) -> MakeFail:
+    """Spoil the sixth frame from now: the frames before it may be dropped as outdated."""
 
-    def strike(camera: EmulatedCamera) -> None:
-        look, left = camera.snapshot, iter(range(6))
+    def make_fail(camera: EmulatedCamera) -> None:
+        original, numbers = camera.snapshot, iter(range(6))
 
         def snapshot() -> object:
-            if next(left, None) == 5:
+            if next(numbers, None) == 5:
                 camera.faults.bad_frames.append(kind)
-            return look()
+            return original()
 
         camera.snapshot = snapshot
 
-    return strike
+    return make_fail
 
 
-def spoil_all(camera: EmulatedCamera) -> None:
+def all_frames_bad(camera: EmulatedCamera) -> None:
     camera.faults.bad_frames.extend(["flagged"] * 10_000)
 
 
-def clamp(camera: EmulatedCamera) -> None:
+def clamp_exposure(camera: EmulatedCamera) -> None:
     camera.faults.clamped_exposure = 1
 
 
@@ -212,13 +209,13 @@ def freeze(camera: EmulatedCamera) -> None:
     camera.faults.frozen = True
 
 
-def thaw(camera: EmulatedCamera) -> None:
+def unfreeze(camera: EmulatedCamera) -> None:
     camera.faults.frozen = False
 
 
-@pytest.mark.parametrize("state", AT)
+@pytest.mark.parametrize("state", STATES)
 @pytest.mark.parametrize("kind", ["flagged", "short"])
-def test_a_bad_frame_is_taken_anew(
+def test_a_bad_frame_is_retaken(
     short: Loaded,
     remote: RemoteCamera,
     whole: list[Reading],
@@ -226,52 +223,52 @@ def test_a_bad_frame_is_taken_anew(
     kind: BadFrame,
     state: str,
 ) -> None:
-    ended = scan(short, remote, tmp_path / "run", (AT[state], spoil_one(kind)))
-    assert ended.error is None
-    assert ended.readings == whole
-    if state == "reading":  # in the others it may have been one of the frames that are dropped
-        assert any("taken anew" in text for text in ended.events["retry"])
+    result = scan(short, remote, tmp_path / "run", (STATES[state], one_bad_frame(kind)))
+    assert result.error is None
+    assert result.readings == whole
+    if state == "reading":  # in other states it may have been among the frames dropped as outdated
+        assert any("taken anew" in text for text in result.events["retry"])
 
 
-@pytest.mark.parametrize("state", AT)
+@pytest.mark.parametrize("state", STATES)
 @pytest.mark.parametrize(
-    ("strike", "heal"),
-    [(EmulatedCamera.unplug, EmulatedCamera.replug), (freeze, thaw)],
+    ("make_fail", "repair"),
+    [(EmulatedCamera.unplug, EmulatedCamera.replug), (freeze, unfreeze)],
     ids=["unplugged", "frozen"],
 )
-def test_a_camera_that_comes_back(
+def test_a_camera_that_returns(
     short: Loaded,
     remote: RemoteCamera,
     whole: list[Reading],
     tmp_path: Path,
-    strike: Strike,
-    heal: Strike,
+    make_fail: MakeFail,
+    repair: MakeFail,
     state: str,
 ) -> None:
-    """It is back when it is asked again: opened anew, set as before, each try in the record."""
+    """It is reopened at the first retry, with its settings; each retry is in the record."""
     failed: list[EmulatedCamera] = []
 
-    def back_at_the_next_try(camera: EmulatedCamera) -> None:
-        strike(camera)
+    def fail_until_retry(camera: EmulatedCamera) -> None:
+        make_fail(camera)
         failed.append(camera)
 
-    with healing(failed, heal):
-        ended = scan(short, remote, tmp_path / "run", (AT[state], back_at_the_next_try))
-    assert ended.error is None
-    assert ended.readings == whole
-    assert any("try 2 of 4" in text for text in ended.events["retry"])
+    with repair_at_retry(failed, repair):
+        result = scan(short, remote, tmp_path / "run", (STATES[state], fail_until_retry))
+    assert result.error is None
+    assert result.readings == whole
+    assert any("try 2 of 4" in text for text in result.events["retry"])
 
 
 @contextmanager
-def healing(failed: list[EmulatedCamera], heal: Strike) -> Iterator[None]:
-    """Once the engine says that it tries again, the camera is back."""
+def repair_at_retry(failed: list[EmulatedCamera], repair: MakeFail) -> Iterator[None]:
+    """Repair the camera once the engine logs its first retry."""
 
-    class Heal(logging.Handler):
+    class RepairHandler(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             if failed and "try 2 of" in record.getMessage():
-                heal(failed.pop())
+                repair(failed.pop())
 
-    log, handler = logging.getLogger("acquisition.engine.retrying_camera"), Heal()
+    log, handler = logging.getLogger("acquisition.engine.retrying_camera"), RepairHandler()
     log.addHandler(handler)
     try:
         yield
@@ -279,16 +276,16 @@ def healing(failed: list[EmulatedCamera], heal: Strike) -> Iterator[None]:
         log.removeHandler(handler)
 
 
-STAYS: dict[str, tuple[Strike, str, str]] = {
-    "bad frames": (spoil_all, "4 bad frames in a series", "moving"),
+LASTING: dict[str, tuple[MakeFail, str, str]] = {
+    "bad frames": (all_frames_bad, "4 bad frames in a series", "moving"),
     "unplugged": (EmulatedCamera.unplug, "still so after 2 s", "reading"),
-    "clamped": (clamp, "asked for, the camera took", "idle"),
+    "clamped": (clamp_exposure, "asked for, the camera took", "idle"),
 }
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", STAYS)
-def test_a_camera_that_stays_bad_is_named_and_the_scan_goes_on_with_a_sound_one(
+@pytest.mark.parametrize("name", LASTING)
+def test_a_lasting_fault_is_reported_and_the_scan_resumes_with_a_sound_camera(
     short: Loaded,
     remote: RemoteCamera,
     whole: list[Reading],
@@ -296,14 +293,14 @@ def test_a_camera_that_stays_bad_is_named_and_the_scan_goes_on_with_a_sound_one(
     name: str,
     slow: bool,
 ) -> None:
-    """In all states, or in the bounded form in one."""
-    strike, says, one = STAYS[name]
-    for state in AT if slow else [one]:
+    """In one state; with --slow in all."""
+    make_fail, message, one = LASTING[name]
+    for state in STATES if slow else [one]:
         folder = tmp_path / state
-        ended = scan(short, remote, folder, (AT[state], strike))
-        require_named(ended, DeviceError, f"camera.*{says}", folder)
-        assert any(what in str(ended.error) for what in ("look at", "look whether", "ask for"))
-        assert ended.readings == whole[: len(ended.readings)]
-        again = scan(short, remote, folder)
-        assert again.error is None
-        assert again.readings == whole
+        result = scan(short, remote, folder, (STATES[state], make_fail))
+        require_reported(result, DeviceError, f"camera.*{message}", folder)
+        assert any(what in str(result.error) for what in ("look at", "look whether", "ask for"))
+        assert result.readings == whole[: len(result.readings)]
+        resumed = scan(short, remote, folder)
+        assert resumed.error is None
+        assert resumed.readings == whole

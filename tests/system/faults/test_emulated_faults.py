@@ -1,8 +1,8 @@
-"""Faults of real drivers' lines and motors within a scan: recovery or a named stop.
+"""Faults of lines and motors under the real drivers during a scan: recovery or a clear stop.
 
-theta_r is a real driver over an emulated controller, in real time; the simulated camera sees where
-its motor truly stands. Whatever fails, and in whichever state of the engine: each accepted reading
-is that of the scan in which nothing failed, and its frames were taken where they should have been.
+theta_r is a real driver over an emulated controller, in real time; the simulated camera sees the
+true motor position. Whatever fails, in any state of the engine, each accepted reading equals that
+of the undisturbed scan, and its frames were taken at the right position.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ from sim.faults.faults import Faults
 from sim.faults.triggers import Triggers, When
 from sim.scene.scene import Scene
 from tests.support import faulty_scan
-from tests.support.faulty_scan import Ended, Watching, require_named
+from tests.support.faulty_scan import ScanResult, WatchedDevice, require_reported
 from tests.support.scans import changed, small_scan
 from tests.support.stages.emulated_stages import EMULATED_STAGES, EmulatedStage
 
 pytestmark = pytest.mark.waits
 
 DEADLINE_S = 5.0
-WITHIN_DEG = 0.01  # the stages' own tolerance in `benches`
+WITHIN_DEG = 0.01  # the stages' tolerance in `emulated_stages`
 PUSH_DEG = 0.4
-UNHEARD = "no status for 0.5 s while it moved"
+STATUS_LATE = "no status for 0.5 s while it moved"
 
-# In each state: at or after which call of which device; of moves the second.
+# A trigger in each state; for moves the second one.
 STATES: dict[str, tuple[When, str, int]] = {
     "idle": ("at", "theta_r.identity", 1),
     "homing": ("at", "theta_r.home", 1),
@@ -53,18 +53,18 @@ STATES: dict[str, tuple[When, str, int]] = {
     "reading": ("at", "theta_r.position_deg", 2),
     "writing": ("at", "record.add_reading", 1),
 }
-Strike = Callable[[EmulatedStage], None]
+MakeFail = Callable[[EmulatedStage], None]
 
 
-def once(fault: Fault) -> Strike:
-    return lambda bench: bench.wire.inject(fault)
+def once(fault: Fault) -> MakeFail:
+    return lambda emulated: emulated.wire.inject(fault)
 
 
-def for_good(fault: Fault) -> Strike:
-    return lambda bench: bench.wire.inject(*[fault] * 2000)
+def permanently(fault: Fault) -> MakeFail:
+    return lambda emulated: emulated.wire.inject(*[fault] * 2000)
 
 
-RECOVERS: dict[str, Strike] = {
+RECOVERS: dict[str, MakeFail] = {
     "drop": once(Fault("drop")),
     "delay": once(Fault("delay", 0.1)),
     "late": once(Fault("late", 0.4)),
@@ -73,51 +73,52 @@ RECOVERS: dict[str, Strike] = {
     "nul": once(Fault("nul")),
     "lose request": once(Fault("lose request")),
 }
-STOPS: dict[str, tuple[Strike, str]] = {
-    "drop for good": (for_good(Fault("drop")), "no answer|not answer"),
-    "late for good": (for_good(Fault("late", 0.3)), "answer"),
-    "garbage for good": (for_good(Fault("garbage")), "answer|only"),
-    "truncate for good": (for_good(Fault("truncate")), "answer|only"),
-    "requests lost for good": (for_good(Fault("lose request")), "no answer|not answer"),
+STOPS: dict[str, tuple[MakeFail, str]] = {
+    "drop permanently": (permanently(Fault("drop")), "no answer|not answer"),
+    "late permanently": (permanently(Fault("late", 0.3)), "answer"),
+    "garbage permanently": (permanently(Fault("garbage")), "answer|only"),
+    "truncate permanently": (permanently(Fault("truncate")), "answer|only"),
+    "requests lost permanently": (permanently(Fault("lose request")), "no answer|not answer"),
     "unplug": (once(Fault("unplug")), "is gone|cannot open|lost|answer"),
-    "alarm": (lambda bench: bench.motor.fail(bench.alarm), "."),
+    "alarm": (lambda emulated: emulated.motor.fail(emulated.alarm), "."),
     "limit switch": (
-        lambda bench: bench.motor.fail(AT_LIMIT[bench.alarm]), "limit|overtravel|end of run",
+        lambda emulated: emulated.motor.fail(AT_LIMIT[emulated.alarm]),
+        "limit|overtravel|end of run",
     ),
 }  # fmt: skip
-AT_LIMIT = {"0020": "0001", "FS": "FE", "30": "66"}  # by the code of another of its faults
-# What the engine does next may set these right: then nothing is heard of them.
-MOTOR: dict[str, Strike] = {
-    "stall": lambda bench: bench.motor.hold(),
-    "push": lambda bench: bench.motor.push(PUSH_DEG),
-    "power lost": lambda bench: bench.motor.lose_power(),
+AT_LIMIT = {"0020": "0001", "FS": "FE", "30": "66"}  # limit code by `EmulatedStage.alarm`
+# Faults that the engine's next action may remove without a report.
+MOTOR: dict[str, MakeFail] = {
+    "stall": lambda emulated: emulated.motor.hold(),
+    "push": lambda emulated: emulated.motor.push(PUSH_DEG),
+    "power lost": lambda emulated: emulated.motor.lose_power(),
 }
-SET_RIGHT = {
-    "stall": ("idle", "homing"),  # nothing holds it while it looks for its reference
+REMOVED = {
+    "stall": ("idle", "homing"),  # homing releases the axis
     "push": ("idle", "homing", "setting out"),
     "power lost": ("idle", "homing"),
 }
-EVERY: dict[str, Strike] = {**RECOVERS, **{k: v for k, (v, _) in STOPS.items()}, **MOTOR}
+EVERY: dict[str, MakeFail] = {**RECOVERS, **{k: v for k, (v, _) in STOPS.items()}, **MOTOR}
 
 
 @dataclass
 class Witness:
-    """The camera: has the scene stand as the motor does, and remembers where it stood."""
+    """Camera that sets the scene to the motor's true position and remembers it for each step."""
 
     camera: object
-    bench: EmulatedStage
+    emulated: EmulatedStage
     scene: Scene
-    stood_deg: dict[int, list[float]] = field(default_factory=lambda: defaultdict(list))
+    positions_deg: dict[int, list[float]] = field(default_factory=lambda: defaultdict(list))
 
     def grab(self, count: int) -> list[Frame]:
-        self._look()
+        self._note_position()
         frames: list[Frame] = self.camera.grab(count)  # type: ignore[attr-defined]  # a stand-in
-        self._look()
+        self._note_position()
         return frames
 
-    def _look(self) -> None:
-        at_deg = self.bench.motor.position_deg
-        self.stood_deg[self.scene.step].append(at_deg)
+    def _note_position(self) -> None:
+        at_deg = self.emulated.motor.position_deg
+        self.positions_deg[self.scene.step].append(at_deg)
         self.scene.set_axis("theta_r", at_deg)
 
     def __getattr__(self, name: str) -> object:
@@ -126,7 +127,7 @@ class Witness:
 
 @pytest.fixture(scope="module")
 def short() -> Loaded:
-    """Three points, nothing else; theta_r settles for 20 ms."""
+    """A scan of three points only; theta_r settles for 20 ms."""
     small = small_scan()
     sweep = {"theta_i_deg": [60.0], "dphi_deg": [0.0], "theta_r_deg": [-40.0, 0.0, 40.0]}
     theta_r = small.rig.axes.theta_r.model_copy(update={"settle_s": 0.02, "zero_deg": 0.0})
@@ -134,64 +135,66 @@ def short() -> Loaded:
     return changed(small, rig={"axes": axes}, sweeps=[sweep], references=References())
 
 
-def devices_of(loaded: Loaded, bench: EmulatedStage, triggers: Triggers) -> tuple[Devices, Witness]:
+def devices_of(
+    loaded: Loaded, emulated: EmulatedStage, triggers: Triggers
+) -> tuple[Devices, Witness]:
     faults = Faults()
     devices = open_devices(loaded, faults)
     assert faults.scene is not None
-    stage = Watching("theta_r", bench.stage, triggers)
-    axis = Axis("theta_r", stage, loaded.rig.axes.theta_r, SystemClock())  # type: ignore[arg-type]  # passes all on
-    witness = Witness(devices.camera, bench, faults.scene)
-    camera = Watching("camera", witness, triggers)
+    stage = WatchedDevice("theta_r", emulated.stage, triggers)
+    axis = Axis("theta_r", stage, loaded.rig.axes.theta_r, SystemClock())  # type: ignore[arg-type]  # forwards everything
+    witness = Witness(devices.camera, emulated, faults.scene)
+    camera = WatchedDevice("camera", witness, triggers)
     axes = {**devices.axes, "theta_r": axis}
-    return replace(devices, axes=axes, camera=camera), witness  # type: ignore[arg-type]  # passes all on
+    return replace(devices, axes=axes, camera=camera), witness  # type: ignore[arg-type]  # forwards everything
 
 
-def scan(loaded: Loaded, bench: EmulatedStage, folder: Path, triggers: Triggers) -> Ended:
-    """Run, or go on; each accepted reading was taken where it should be."""
-    devices, witness = devices_of(loaded, bench, triggers)
-    ended = faulty_scan.scan(loaded, folder, lambda: devices, triggers)
-    for reading in ended.readings[ended.before :]:
-        stood_deg = witness.stood_deg[reading.step]
-        assert stood_deg
-        assert max(abs(at_deg - reading.theta_r_deg) for at_deg in stood_deg) <= WITHIN_DEG
-    return ended
+def scan(loaded: Loaded, emulated: EmulatedStage, folder: Path, triggers: Triggers) -> ScanResult:
+    """Run or resume a scan; each new reading must have been taken at the right position."""
+    devices, witness = devices_of(loaded, emulated, triggers)
+    result = faulty_scan.scan(loaded, folder, lambda: devices, triggers)
+    for reading in result.readings[result.before :]:
+        positions_deg = witness.positions_deg[reading.step]
+        assert positions_deg
+        assert max(abs(at_deg - reading.theta_r_deg) for at_deg in positions_deg) <= WITHIN_DEG
+    return result
 
 
-def whole_scan(loaded: Loaded, bench: EmulatedStage, folder: Path) -> list[Reading]:
-    """Run or go on to the end; on a busy machine the emulated controller itself may be too late."""
+def complete_scan(loaded: Loaded, emulated: EmulatedStage, folder: Path) -> list[Reading]:
+    """Run or resume to the end; on a busy machine the emulated controller may answer too late."""
     for last in (False, False, True):
-        ended = scan(loaded, bench, folder, Triggers())
-        if ended.error is None or last:
+        result = scan(loaded, emulated, folder, Triggers())
+        if result.error is None or last:
             break
-        assert UNHEARD in str(ended.error)
-    assert ended.error is None
-    return ended.readings
+        assert STATUS_LATE in str(result.error)
+    assert result.error is None
+    return result.readings
 
 
 @pytest.fixture(scope="module")
 def sound(
     short: Loaded, tmp_path_factory: pytest.TempPathFactory
 ) -> Callable[[str], list[Reading]]:
-    """The readings of a scan with a controller in which nothing failed."""
-    known: dict[str, list[Reading]] = {}
+    """Readings of the undisturbed scan with each controller."""
+    cache: dict[str, list[Reading]] = {}
 
     def readings(kind: str) -> list[Reading]:
-        if kind not in known:
+        if kind not in cache:
             folder = tmp_path_factory.mktemp("sound") / "run"
-            with EMULATED_STAGES[kind]() as bench:
-                known[kind] = whole_scan(short, bench, folder)
-        return known[kind]
+            with EMULATED_STAGES[kind]() as emulated:
+                cache[kind] = complete_scan(short, emulated, folder)
+        return cache[kind]
 
     return readings
 
 
 def cases() -> Iterator[tuple[str, str]]:
-    yield from ((bench, state) for bench in EMULATED_STAGES for state in STATES)
+    yield from ((kind, state) for kind in EMULATED_STAGES for state in STATES)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "state"), list(cases()))
-def test_a_fault_in_a_state(
+def test_a_fault_in_each_state(
     short: Loaded,
     sound: Callable[[str], list[Reading]],
     tmp_path: Path,
@@ -199,59 +202,61 @@ def test_a_fault_in_a_state(
     state: str,
     slow: bool,
 ) -> None:
-    """All faults, or in the bounded form two that differ from case to case."""
+    """Two faults, different in each case; with --slow all."""
     number = list(cases()).index((kind, state))
     names = list(EVERY)
     chosen = names if slow else [names[(2 * number + n) % len(names)] for n in (0, 1)]
     for name in chosen:
         triggers, folder = Triggers(), tmp_path / name
-        with EMULATED_STAGES[kind]() as bench:
-            triggers.plan(*STATES[state], partial(EVERY[name], bench))
-            ended = scan(short, bench, folder, triggers)
-            assert ended.readings == sound(kind)[: len(ended.readings)]
-            if ended.error is None:
+        with EMULATED_STAGES[kind]() as emulated:
+            triggers.plan(*STATES[state], partial(EVERY[name], emulated))
+            result = scan(short, emulated, folder, triggers)
+            assert result.readings == sound(kind)[: len(result.readings)]
+            if result.error is None:
                 assert triggers.pending == 0
-                require_got_over(ended, name, state)
+                require_recovered(result, name, state)
             else:
-                require_stopped(ended, bench, name, state, folder)
-                other = EMULATED_STAGES[kind]() if name == "unplug" else seen_to(bench)
+                require_stopped(result, emulated, name, state, folder)
+                other = EMULATED_STAGES[kind]() if name == "unplug" else repaired(emulated)
                 with other as again:
-                    assert whole_scan(short, again, folder) == sound(kind)
+                    assert complete_scan(short, again, folder) == sound(kind)
 
 
-def require_got_over(ended: Ended, name: str, state: str) -> None:
-    assert name in RECOVERS or state in SET_RIGHT[name]
-    if name in RECOVERS and name not in ("delay", "nul"):  # these are within what is heard
-        assert ended.events["retry"]
+def require_recovered(result: ScanResult, name: str, state: str) -> None:
+    assert name in RECOVERS or state in REMOVED[name]
+    if name in RECOVERS and name not in ("delay", "nul"):  # these answers still arrive in time
+        assert result.events["retry"]
 
 
 def require_stopped(
-    ended: Ended, bench: EmulatedStage, name: str, state: str, folder: Path
+    result: ScanResult, emulated: EmulatedStage, name: str, state: str, folder: Path
 ) -> None:
-    """Named; of what is mostly got over, it is too late an answer that ends the scan."""
-    says = STOPS[name][1] if name in STOPS else "stall|stands|homed|reference"
-    if name in RECOVERS or state in SET_RIGHT.get(name, ()):
-        says = UNHEARD
-    message = rf"theta_r.*({says}|{UNHEARD})(.|\n)*(look (at|for)|home it|by hand)"
-    require_named(ended, DeviceError, message, folder)
-    require_still(bench)
+    """A recoverable fault may end the scan only because an answer came too late."""
+    cause = STOPS[name][1] if name in STOPS else "stall|stands|homed|reference"
+    if name in RECOVERS or state in REMOVED.get(name, ()):
+        cause = STATUS_LATE
+    message = (
+        rf"theta_r.*({cause}|{STATUS_LATE})(.|\n)*(look (at|for)|check|find out|home it|by hand)"
+    )
+    require_reported(result, DeviceError, message, folder)
+    require_still(emulated)
 
 
-def require_still(bench: EmulatedStage) -> None:
-    """A stop that is on its way is soon heard; a move that no stop can reach ends by itself."""
+def require_still(emulated: EmulatedStage) -> None:
+    """The axis comes to rest: by the stop, or by the end of the move if no stop can reach it."""
     end_s = time.monotonic() + DEADLINE_S
-    while bench.motor.moving:
+    while emulated.motor.moving:
         assert time.monotonic() < end_s
         time.sleep(0.005)
 
 
 @contextmanager
-def seen_to(bench: EmulatedStage) -> Iterator[EmulatedStage]:
-    """The same controller, put right and asked anew."""
-    bench.wire.clear_faults()
-    bench.motor.alarm = ""
-    bench.motor.stop()
-    bench.stage.close()
-    stage = bench.reopen()
-    yield replace(bench, stage=stage)
+def repaired(emulated: EmulatedStage) -> Iterator[EmulatedStage]:
+    """The same controller, repaired and reopened."""
+    emulated.wire.clear_faults()
+    emulated.motor.alarm = ""
+    emulated.motor.stop()
+    emulated.stage.close()
+    stage = emulated.reopen()
+    yield replace(emulated, stage=stage)
     stage.close()

@@ -1,4 +1,4 @@
-"""What is made of a complete record: a disk that fails then, and how a person tries faults."""
+"""Result files on a failing disk, and a scan with a fault planned in `GONIO_FAULTS`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def small() -> Loaded:
 
 @pytest.fixture(scope="module")
 def complete(small: Loaded, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a run of the command, with few points and one model to fit."""
+    """Folder of a complete run with few points and one model to fit."""
     folder = tmp_path_factory.mktemp("complete")
     text = (Path(small.protocol_path).read_text()).replace("num: 33", "num: 5")
     text = text.replace("../rigs/", f"{small.protocol_path.parent.parent / 'rigs'}/")
@@ -40,7 +40,7 @@ def complete(small: Loaded, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @contextmanager
 def full_disk(largest_byte: int) -> Iterator[None]:
-    """No file grows beyond so many bytes: what a full disk is to whoever writes one."""
+    """Limit the size of every file, so that writing fails as on a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (largest_byte, hard))
     try:
@@ -49,16 +49,18 @@ def full_disk(largest_byte: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def as_it_was(folder: Path) -> dict[str, bytes]:
+def result_files(folder: Path) -> dict[str, bytes]:
     return {name: (folder / name).read_bytes() for name in RESULTS if (folder / name).exists()}
 
 
 @pytest.mark.parametrize("too_large", RESULTS)
-def test_a_result_that_the_disk_does_not_take(complete: Path, too_large: str) -> None:
-    """There is room for all that is smaller: those are whole, the first that is not is named."""
+def test_a_result_too_large_for_the_disk_is_reported_and_later_written(
+    complete: Path, too_large: str
+) -> None:
+    """Smaller results before it are complete; the first that does not fit is named."""
     from acquisition.results.run_folder import load_run_inputs
 
-    before = as_it_was(complete)
+    before = result_files(complete)
     room = len(before[too_large]) - 1
     first = next(name for name in RESULTS if len(before[name]) > room)
     for name in RESULTS:
@@ -69,14 +71,13 @@ def test_a_result_that_the_disk_does_not_take(complete: Path, too_large: str) ->
             finish(record, loaded)
         assert f"{complete / first}: cannot be written" in str(failed.value)
         assert f"gonio report {complete}" in str(failed.value)
-        assert as_it_was(complete) == {n: before[n] for n in RESULTS[: RESULTS.index(first)]}
+        assert result_files(complete) == {n: before[n] for n in RESULTS[: RESULTS.index(first)]}
         assert not list(complete.glob(".*.part"))
         finish(record, loaded)
-    assert as_it_was(complete) == before
+    assert result_files(complete) == before
 
 
-def test_a_result_whose_name_is_taken(complete: Path) -> None:
-    """A folder stands where fit.json should be: exit 3, named, and nothing half-written."""
+def test_a_folder_in_place_of_fit_json_is_reported(complete: Path) -> None:
     (complete / "fit.json").unlink()
     (complete / "fit.json").mkdir()
     done = gonio("report", complete)
@@ -88,10 +89,7 @@ def test_a_result_whose_name_is_taken(complete: Path) -> None:
     assert json.loads((complete / "fit.json").read_text())["verdict"]
 
 
-# How a person tries it.
-
-
-def test_a_person_plans_a_fault_in_words(
+def test_a_fault_from_the_environment_stops_the_scan_and_resume_completes_it(
     complete: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     protocol, folder = complete.parent / "foam.yaml", tmp_path / "run"
@@ -103,10 +101,10 @@ def test_a_person_plans_a_fault_in_words(
     monkeypatch.delenv(VARIABLE)
     assert gonio("resume", folder, "--yes").returncode == 0
     old, new = ((f / "measurements.csv").read_text() for f in (complete, folder))
-    assert without_date(new) == without_date(old)
+    assert without_dates(new) == without_dates(old)
 
 
-def without_date(table: str) -> list[list[str]]:
+def without_dates(table: str) -> list[list[str]]:
     rows = [line.split(",") for line in table.splitlines()]
     date = rows[0].index("time_utc")
     return [row[:date] + row[date + 1 :] for row in rows]
