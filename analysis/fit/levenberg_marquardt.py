@@ -48,10 +48,40 @@ class Minimum(NamedTuple):
 
 
 class _Quadratic(NamedTuple):
-    """Quadratic model of the loss: half its gradient, and the Gauss-Newton matrix J^T J."""
+    """Quadratic model of the loss at x, with bounds: half its gradient, and the matrix J^T J."""
 
+    x: FloatArray
+    low: FloatArray
+    high: FloatArray
     gradient: FloatArray
     curvature: FloatArray
+
+    def fixed(self) -> BoolArray:
+        """Parameters at a bound that descent would cross, and those without any effect."""
+        at_low = (self.x <= self.low) & (self.gradient >= 0)
+        at_high = (self.x >= self.high) & (self.gradient <= 0)
+        return np.asarray(at_low | at_high | (np.diag(self.curvature) <= 0))
+
+    def stationary(self, chi2: float, tolerance: float) -> bool:
+        """True where no free parameter has a gradient beyond `tolerance`, as a cosine."""
+        free = ~self.fixed()
+        scale = np.sqrt(np.diag(self.curvature)[free] * chi2)
+        return bool(np.all(np.abs(self.gradient[free]) <= tolerance * scale))
+
+    def stationary_to_rounding(self, chi2: float) -> bool:
+        """Test for a minimum where rounding of the residuals ends the search."""
+        rounding = _ROUNDING**2 * float(np.diag(self.curvature) @ np.square(self.x))
+        return chi2 <= rounding or self.stationary(chi2, _ROUGHLY_STATIONARY)
+
+    def decrease(self, step: FloatArray) -> float:
+        """Decrease of chi2 by a step if the residuals were linear in it."""
+        return float(-step @ (2 * self.gradient + self.curvature @ step))
+
+    def moved(self, step: FloatArray) -> FloatArray:
+        """x + step, exactly on a bound where the step ends there."""
+        inside = np.clip(self.x + step, self.low, self.high)
+        at_high = np.where(step >= self.high - self.x, self.high, inside)
+        return np.where(step <= self.low - self.x, self.low, at_high)
 
 
 def loss(residual: FloatArray, huber: float | None = None) -> float:
@@ -84,18 +114,24 @@ def descend(
     Parameter vectors have the shape (K,), each in its own unit; `jacobian(x)` is (N, K). The
     search ends with a step that lowers chi2 by no more than `atol`, or the fraction `rtol` of it.
     """
+
+    def quadratic(x: FloatArray, r: FloatArray) -> _Quadratic:
+        J = jacobian(x)
+        weighted = J.T if huber is None else J.T * weights(r, huber)
+        return _Quadratic(x, low, high, weighted @ r, weighted @ J)
+
     x, r = start, residual(start)
     chi2 = loss(r, huber)
     first, damping = chi2, _FIRST_DAMPING
-    model = _quadratic(r, jacobian(x), huber)
+    model = quadratic(x, r)
     for _ in range(_MAX_STEPS):
-        if _stationary(model, x, low, high, chi2, _STATIONARY):
+        if model.stationary(chi2, _STATIONARY):
             return Minimum(x, chi2, True, "the gradient is zero")
-        step = _damped_step(model, x, low, high, damping)
-        if _predicted_decrease(model, step) <= max(_NEGLIGIBLE * chi2, atol / 10):
-            found = damping <= _SHORT_STEPS or _stationary_to_rounding(model, x, low, high, chi2)
+        step = _damped_step(model, damping)
+        if model.decrease(step) <= max(_NEGLIGIBLE * chi2, atol / 10):
+            found = damping <= _SHORT_STEPS or model.stationary_to_rounding(chi2)
             return Minimum(x, chi2, found, _CONVERGED if found else _NO_STEP)
-        new = _apply_step(x, step, low, high)
+        new = model.moved(step)
         r = residual(new)
         reached = loss(r, huber)
         if reached < chi2:
@@ -104,61 +140,24 @@ def descend(
             if little or chi2 <= _ZERO * first:
                 return Minimum(x, chi2, True, _CONVERGED)
             damping = max(damping / 10, _MIN_DAMPING)
-            model = _quadratic(r, jacobian(x), huber)
+            model = quadratic(x, r)
         elif damping >= _MAX_DAMPING or np.array_equal(new, x):
-            found = _stationary_to_rounding(model, x, low, high, chi2)
-            return Minimum(x, chi2, found, _NO_STEP)
+            return Minimum(x, chi2, model.stationary_to_rounding(chi2), _NO_STEP)
         else:
             damping *= 10
     return Minimum(x, chi2, False, f"chi2 has not converged in {_MAX_STEPS} steps")
 
 
-def _quadratic(r: FloatArray, J: FloatArray, huber: float | None) -> _Quadratic:
-    if huber is None:
-        return _Quadratic(J.T @ r, J.T @ J)
-    weighted = J.T * weights(r, huber)
-    return _Quadratic(weighted @ r, weighted @ J)
-
-
-def _fixed(model: _Quadratic, x: FloatArray, low: FloatArray, high: FloatArray) -> BoolArray:
-    """Parameters at a bound that descent would cross, and those without any effect."""
-    at_low, at_high = (x <= low) & (model.gradient >= 0), (x >= high) & (model.gradient <= 0)
-    return np.asarray(at_low | at_high | (np.diag(model.curvature) <= 0))
-
-
-def _stationary(
-    model: _Quadratic,
-    x: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    chi2: float,
-    tolerance: float,
-) -> bool:
-    free = ~_fixed(model, x, low, high)
-    scale = np.sqrt(np.diag(model.curvature)[free] * chi2)
-    return bool(np.all(np.abs(model.gradient[free]) <= tolerance * scale))
-
-
-def _stationary_to_rounding(
-    model: _Quadratic, x: FloatArray, low: FloatArray, high: FloatArray, chi2: float
-) -> bool:
-    """Test for a minimum where rounding of the residuals ends the search."""
-    rounding = _ROUNDING**2 * float(np.diag(model.curvature) @ np.square(x))
-    return chi2 <= rounding or _stationary(model, x, low, high, chi2, _ROUGHLY_STATIONARY)
-
-
-def _damped_step(
-    model: _Quadratic, x: FloatArray, low: FloatArray, high: FloatArray, damping: float
-) -> FloatArray:
+def _damped_step(model: _Quadratic, damping: float) -> FloatArray:
     """Step to the minimum of the damped quadratic model within the bounds.
 
     The step goes from face to face of the box, always downhill: up to the first bound, which then
     stays fixed; at the minimum of a face, bounds that no longer block the descent are released.
     """
     A = model.curvature + damping * np.diag(np.diag(model.curvature))
-    down, up = low - x, high - x
-    step, free = np.zeros_like(x), ~_fixed(model, x, low, high)
-    for _ in range(_MAX_FACES * x.size):
+    down, up = model.low - model.x, model.high - model.x
+    step, free = np.zeros_like(model.x), ~model.fixed()
+    for _ in range(_MAX_FACES * step.size):
         step, hit = _step_in_face(A, model.gradient, step, free, down, up)
         free &= ~hit
         if np.any(hit):
@@ -191,17 +190,6 @@ def _step_in_face(
     part[over] = ((bound - step)[over]) / ((target - step)[over])
     hit = over & (part <= np.min(part))
     return np.where(hit, bound, step + np.min(part) * (target - step)), hit
-
-
-def _apply_step(x: FloatArray, step: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """x + step, exactly on a bound where the step ends there."""
-    inside = np.clip(x + step, low, high)
-    return np.where(step <= low - x, low, np.where(step >= high - x, high, inside))
-
-
-def _predicted_decrease(model: _Quadratic, step: FloatArray) -> float:
-    """Decrease of chi2 by a step if the residuals were linear in it."""
-    return float(-step @ (2 * model.gradient + model.curvature @ step))
 
 
 def _solve_scaled(A: FloatArray, b: FloatArray) -> FloatArray:
