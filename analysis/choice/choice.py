@@ -14,14 +14,7 @@ import numpy as np
 
 from analysis.choice.candidates import Candidates
 from analysis.choice.cross_validation import folds, held_out_error
-from analysis.choice.ladder import (
-    LADDER,
-    RICH,
-    SAME_PREDICTION,
-    MethodOfFit,
-    physics,
-    with_method,
-)
+from analysis.choice.ladder import LADDER, RICH, SAME_PREDICTION, MethodOfFit, physics, with_method
 from analysis.choice.runs_test import runs_probability, worst_stretches
 from analysis.choice.symmetry_test import Symmetry, p_text, symmetry
 from analysis.data.acceptance import Acceptance

@@ -12,12 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
-from analysis.data.covariance import (
-    Covariance,
-    angle_sensitivity,
-    append_column,
-    full_covariance,
-)
+from analysis.data.covariance import Covariance, angle_sensitivity, append_column, full_covariance
 from analysis.data.measurements import Measurements
 from analysis.data.sweeps import plane_and_view, sweeps
 from analysis.fit.criteria import SIGNIFICANCE

@@ -7,6 +7,7 @@ every point by one standard deviation of it (GUM; generalised least squares as i
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -143,20 +144,16 @@ def full_covariance(
     if m.u_random is None:
         raise ValueError("u_random is not stated; allowed: a u_random in 1/sr for every point")
     f = own(m.geometry)
-    view, incidence, azimuth = (
-        {"theta_r": m.u_theta_r_deg},
-        {"theta_i": m.u_theta_i_deg},
-        {"dphi": m.u_dphi_deg},
+    angles: tuple[tuple[str, dict[str, float], Brdf, IntArray | FloatArray], ...] = (
+        ("theta_r", {"theta_r": m.u_theta_r_deg}, smooth, m.theta_r_deg),
+        ("theta_i, lamp setting", {"theta_i": m.u_theta_i_deg}, own, m.lamp_setting),
+        ("dphi, lamp setting", {"dphi": m.u_dphi_deg}, own, m.lamp_setting),
     )
-    groups: list[tuple[str, FloatArray, IntArray | FloatArray]] = [
-        ("theta_r", angle_sensitivity(m, smooth, **view), m.theta_r_deg),
-        ("theta_i, lamp setting", angle_sensitivity(m, own, **incidence), m.lamp_setting),
-        ("dphi, lamp setting", angle_sensitivity(m, own, **azimuth), m.lamp_setting),
-        *((error.name, f * error.u_relative, error.group) for error in m.shared),
-    ]
+    groups = [(name, angle_sensitivity(m, brdf, **u), group) for name, u, brdf, group in angles]
+    groups += [(error.name, f * error.u_relative, error.group) for error in m.shared]
     if m.free_levels:
         groups.append((LAMP_LEVEL, _U_UNKNOWN_LEVEL * f, m.lamp_setting))
-    second_order = [_second_order_u(m, smooth, **angle) for angle in (view, incidence, azimuth)]
+    second_order = [_second_order_u(m, smooth, **u) for _, u, _, _ in angles]
     variance = np.square(m.u_random) + np.sum(np.square(second_order), axis=0)
     columns, names = [], []
     for name, shift, group in groups:
@@ -166,7 +163,7 @@ def full_covariance(
         names += [f"{name}{label}" for label in labels]
     common = csr_array(hstack(columns))
     dense = common.shape[0] * common.shape[1] <= _MAX_DENSE
-    return Covariance(variance, common.toarray() if dense else common, _numbered(names))
+    return Covariance(variance, common.toarray() if dense else common, tuple(_numbered(names)))
 
 
 def _columns(
@@ -191,14 +188,12 @@ def _columns(
     return np.where(single, shift, 0.0), columns, labels
 
 
-def _numbered(names: list[str]) -> tuple[str, ...]:
+def _numbered(names: list[str]) -> Iterator[str]:
     """Names made unique: those that occur several times get a number each."""
     total, so_far = Counter(names), Counter[str]()
-    unique = []
     for name in names:
         so_far[name] += 1
-        unique.append(name if total[name] == 1 else f"{name} {so_far[name]}")
-    return tuple(unique)
+        yield name if total[name] == 1 else f"{name} {so_far[name]}"
 
 
 def angle_sensitivity(m: Measurements, smooth: Brdf, **u_angle: float) -> FloatArray:

@@ -32,24 +32,19 @@ NOT_CONVERGED = "the averaging over lamp and lens did not converge"
 class FitResult:
     """A model fitted to N points; mappings are by parameter name, in the parameters' units.
 
-    problem, x: the problem solved, and the parameters (K,) in the model's order.
-    values: the parameters by name.
-    u: standard uncertainties, None where none is valid; `intervals` then has the 95 %
-        profile-likelihood interval.
-    undetermined: parameters whose interval is more than half of their domain.
-    correlation: (K, K), NaN for a parameter without u.
-    predicted: (N,) in 1/sr.
-    u_total: (N,) in 1/sr, of each point; estimated from the residuals where no u is stated.
-    residuals: (N,), measured minus predicted, less the most likely values of the errors that
-        points share, in units of the independent part of u.
-    pulls: those most likely values by name, in units of their own u: above 2 or 3 one is suspect.
+    problem, x: the problem solved, and the parameters (K,) in the model's order. values: the same
+    by name. u: standard uncertainties, None where none is valid; `intervals` then has the 95 %
+    profile-likelihood interval. undetermined: parameters whose interval is more than half of their
+    domain. correlation: (K, K), NaN for a parameter without u.
+    predicted: (N,) in 1/sr. u_total: (N,) in 1/sr, of each point; estimated from the residuals
+    where no u is stated. residuals: (N,), measured minus predicted, less the most likely values of
+    the errors that points share, in units of the independent part of u. pulls: those most likely
+    values by name, in units of their own u: above 2 or 3 one is suspect.
     outliers: (N,), points that a robust fit set aside; they do not count in what follows.
     chi2, reduced_chi2: None where no u is stated; reduced_chi2 also without degrees of freedom.
     bic, aicc: chi2 + K ln N and chi2 + 2 K N / (N - K - 1), with N ln(rss / N) for chi2 where no u
-        is stated.
-    rms_relative: rms residual over mean BRDF.
-    averaged: the model was averaged over the rig's acceptance, as that makes a difference.
-    message: why the search ended.
+    is stated. rms_relative: rms residual over mean BRDF. averaged: the model was averaged over the
+    rig's acceptance, which is done where that matters. message: why the search ended.
     """
 
     model: str

@@ -286,13 +286,8 @@ def _lamp_mark(ax: Axes, sweep: PlottedSweep, name: str) -> None:
     ax.axvline(at, color=colour, linewidth=0.7, linestyle=(0, (1, 3)), zorder=1)
     ax.plot([at], [1.0], marker=7, color=colour, ms=7, transform=above, clip_on=False, zorder=7)
     if name:
-        beside: dict[str, Any] = {
-            "xycoords": above,
-            "textcoords": "offset points",
-            "xytext": (0, 8),
-        }
-        text = f"{name}{round(at, 1):g}°"
-        ax.annotate(text, (at, 1.0), ha="center", color=colour, size=9, **beside)
+        text, place = f"{name}{round(at, 1):g}°", ((at, 1.0), (0, 8), above, "offset points")
+        ax.annotate(text, *place, ha="center", color=colour, size=9)
 
 
 def _view_axis(ax: Axes, in_plane: bool, columns: int) -> None:

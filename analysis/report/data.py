@@ -116,6 +116,13 @@ class ReportData:
         return bool(np.any(np.isfinite(self.brdf)))
 
     @property
+    def value_and_u(self) -> tuple[FloatArray, FloatArray]:
+        """BRDF (N,) and its u in 1/sr; without a white tile radiance and its u in counts/s."""
+        if self.has_brdf:
+            return self.brdf, self.u_brdf
+        return self.radiance, self.u_radiance
+
+    @property
     def flagged(self) -> BoolArray:
         """Boolean mask (N,) of the points with a flag."""
         return np.array([bool(flag) for flag in self.flags], dtype=bool)
@@ -180,7 +187,7 @@ class PlottedSweep:
 
 def group_sweeps(data: ReportData) -> tuple[PlottedSweep, ...]:
     """Group the points with finite values into sweeps: one per lamp direction and plane."""
-    value, _ = _value_and_u(data)
+    value, _ = data.value_and_u
     dphi_deg, theta_r_deg = _folded(data.dphi_deg, data.theta_r_deg)
     usable = np.isfinite(value) & np.isfinite(data.theta_i_deg)
     usable &= np.isfinite(dphi_deg) & np.isfinite(theta_r_deg)
@@ -198,7 +205,7 @@ def group_sweeps(data: ReportData) -> tuple[PlottedSweep, ...]:
 def _sweep(
     data: ReportData, plane: int, incidence: int, at: IntArray, dphi_deg: float, theta_r: FloatArray
 ) -> PlottedSweep:
-    value, u = (column[at] for column in _value_and_u(data))
+    value, u = (column[at] for column in data.value_and_u)
     theta_i_deg, good = float(np.median(data.theta_i_deg[at])), ~data.flagged[at]
     grid = _grid(theta_r)
     lines = [c.curve(theta_i_deg, dphi_deg, grid) for c in data.plotted if c.curve is not None]
@@ -221,10 +228,6 @@ def _sweep(
         lines=tuple(line[measured] for line in lines),
         at_normal=_at_normal(theta_r[good], value[good], grid, lines),
     )
-
-
-def _value_and_u(data: ReportData) -> tuple[FloatArray, FloatArray]:
-    return (data.brdf, data.u_brdf) if data.has_brdf else (data.radiance, data.u_radiance)
 
 
 def _folded(dphi_deg: FloatArray, theta_r_deg: FloatArray) -> tuple[FloatArray, FloatArray]:

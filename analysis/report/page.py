@@ -93,11 +93,12 @@ def _counts(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
 def _verdict(data: ReportData) -> str:
     kind, state = _STATES.get(data.verdict_kind, ("", ""))
     headline, *more = data.verdict or ("No model was fitted.",)
-    chosen = next((c for c in data.candidates if c.chosen), None)
-    values = []
-    if chosen is not None:
-        found = ((_text(p.name), _value_of(p)) for p in chosen.parameters)
-        values = [_term(*pair) for pair in found]
+    values = [
+        f"<div><dt>{_text(p.name)}</dt><dd>{_value_of(p)}</dd></div>"
+        for candidate in data.candidates
+        for p in candidate.parameters
+        if candidate.chosen
+    ]
     return "\n".join(
         [
             f'<section id="verdict" class="verdict {kind}">',
@@ -108,10 +109,6 @@ def _verdict(data: ReportData) -> str:
             "</section>",
         ]
     )
-
-
-def _term(label: str, value: str) -> str:
-    return f"<div><dt>{label}</dt><dd>{value}</dd></div>"
 
 
 def _name(candidate: Candidate) -> str:
@@ -139,24 +136,17 @@ def _charts(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
         return '<h2 id="shape">Measured values</h2>\n<p>No geometry has a value to plot.</p>'
     name = "BRDF" if data.has_brdf else "Radiance"
     quantity = "BRDF (1/sr)" if data.has_brdf else "radiance (counts/s)"
-    return "\n".join(
-        [
-            '<h2 id="shape">Shape of the reflection</h2>',
-            _figure(
-                charts.normalised_charts(sweeps),
-                "normalised radiance",
-                _shape_caption(data, sweeps),
-            ),
-            f'<h2 id="brdf">{name} at each incidence</h2>',
-            _figure([charts.brdf_chart(sweeps, quantity)], quantity, _panel_caption(data, sweeps)),
-            f'<h2 id="polar">{name} around the sample</h2>',
-            _figure(
-                [charts.polar_chart(sweeps, quantity)],
-                f"{quantity}, polar",
-                _polar_caption(data, sweeps, quantity),
-            ),
-        ]
+    shapes, panels = charts.normalised_charts(sweeps), [charts.brdf_chart(sweeps, quantity)]
+    polar = [charts.polar_chart(sweeps, quantity)]
+    figures = (
+        '<h2 id="shape">Shape of the reflection</h2>',
+        _figure(shapes, "normalised radiance", _shape_caption(data, sweeps)),
+        f'<h2 id="brdf">{name} at each incidence</h2>',
+        _figure(panels, quantity, _panel_caption(data, sweeps)),
+        f'<h2 id="polar">{name} around the sample</h2>',
+        _figure(polar, f"{quantity}, polar", _polar_caption(data, sweeps, quantity)),
     )
+    return "\n".join(figures)
 
 
 def _figure(drawings: list[str], label: str, caption: str) -> str:
@@ -169,7 +159,7 @@ def _shape_caption(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
     caption = [
         "Radiance relative to its value along the sample’s normal (θᵣ = 0), against the view "
         "angle. Positive θᵣ is the lamp’s side. Error bars: standard uncertainty u (k = 1), often "
-        "smaller than the markers.",
+        "smaller than the markers."
     ]
     if any(s.in_plane for s in sweeps):
         caption.append("▼ marks the lamp’s direction, θᵣ = θᵢ.")
@@ -226,15 +216,11 @@ def _candidates(data: ReportData) -> str:
         return ""
     known = [c.bic for c in data.candidates if c.bic is not None and math.isfinite(c.bic)]
     best = min(known, default=None)
-    head = _row(
-        ("Model", "Parameters ± u (k = 1)", "#Residual, rms", "#Reduced χ²", "#ΔBIC"),
-        cell="th",
-    )
+    head = ("Model", "Parameters ± u (k = 1)", "#Residual, rms", "#Reduced χ²", "#ΔBIC")
     tag = "✔ chosen" if data.verdict_kind == "adequate" else "best candidate"
-    rows = "".join(_candidate(c, best, tag) for c in data.ranked)
+    table = _table(head, (_candidate(c, best, tag) for c in data.ranked))
     return (
-        '<h2 id="candidates">Models compared</h2>\n'
-        f'<div class="wide"><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>\n'
+        f'<h2 id="candidates">Models compared</h2>\n{table}\n'
         '<p class="soft">Residual: relative to the mean. Reduced χ² near 1: the model agrees with '
         "the data within their uncertainty. ΔBIC: difference from the lowest BIC, which includes a "
         "penalty for each parameter. Brackets: 95 % interval.</p>"
@@ -263,6 +249,11 @@ def _candidate(candidate: Candidate, best_bic: float | None, tag: str) -> str:
     return _row(cells, "chosen" if candidate.chosen else "")
 
 
+def _table(head: Iterable[str], rows: Iterable[str]) -> str:
+    body = f"<thead>{_row(head, cell='th')}</thead><tbody>{''.join(rows)}</tbody>"
+    return f'<div class="wide"><table>{body}</table></div>'
+
+
 def _row(cells: Iterable[str], style: str = "", cell: str = "td") -> str:
     """Table row of cells in HTML; a cell that begins with # is a number."""
     made = (
@@ -276,40 +267,32 @@ def _flagged(data: ReportData) -> str:
     at = [i for i, flag in enumerate(data.flags) if flag]
     if not at:
         return ""
-    value, u = (data.brdf, data.u_brdf) if data.has_brdf else (data.radiance, data.u_radiance)
+    value, u = data.value_and_u
     unit = "1/sr" if data.has_brdf else "counts/s"
-    rows = "".join(
-        _row(
-            (
-                f"#{_number(data.theta_i_deg[i], 'g')}°",
-                f"#{_number(data.dphi_deg[i], 'g')}°",
-                f"#{_number(data.theta_r_deg[i], 'g')}°",
-                f"#{format_value(float(value[i]), float(u[i]), unit)}",
-                _text(data.flags[i]),
-            )
-        )
-        for i in at
-    )
-    head = _row(("#θᵢ", "#Δφ", "#θᵣ", "#Value ± u (k = 1)", "Flag"), cell="th")
+    rows = []
+    for i in at:
+        angles = (data.theta_i_deg[i], data.dphi_deg[i], data.theta_r_deg[i])
+        measured = format_value(float(value[i]), float(u[i]), unit)
+        cells = (*(f"#{_number(a, 'g')}°" for a in angles), f"#{measured}", _text(data.flags[i]))
+        rows.append(_row(cells))
     return (
         '<h2 id="flagged">Flagged points</h2>\n'
         '<p class="soft">Marked with a cross; outliers may lie outside a chart.</p>\n'
-        f'<div class="wide"><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>'
+        + _table(("#θᵢ", "#Δφ", "#θᵣ", "#Value ± u (k = 1)", "Flag"), rows)
     )
 
 
 def _budget(data: ReportData) -> str:
     if not data.budget:
         return ""
-    head = _row(("Source", "#Relative u, median", "#Share of variance", ""), cell="th")
-    rows = "".join(
+    rows = (
         _row((_text(name), f"#{_percent(u)}", f"#{_number(share, '.0f')} %", _bar(share)))
         for name, u, share in data.budget
     )
     return (
         '<h2 id="budget">Uncertainty budget</h2>\n'
         '<p class="soft">Standard uncertainty (k = 1) of a point, relative to its value.</p>\n'
-        f'<div class="wide"><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>'
+        + _table(("Source", "#Relative u, median", "#Share of variance", ""), rows)
     )
 
 
@@ -376,11 +359,8 @@ def _facts(data: ReportData) -> str:
         ("versions", "Versions", data.versions),
     )
     found = "".join(_fact(*table) for table in tables if table[2])
-    return (
-        f'<h2 id="facts">Measurement conditions</h2>\n<div class="facts">{found}</div>'
-        if found
-        else ""
-    )
+    title = '<h2 id="facts">Measurement conditions</h2>'
+    return f'{title}\n<div class="facts">{found}</div>' if found else ""
 
 
 def _fact(name: str, title: str, rows: Rows) -> str:
