@@ -23,13 +23,7 @@ def to_json(choice: Choice) -> dict[str, Any]:
 
 def no_fit_json(reason: str) -> dict[str, Any]:
     """Content where no model could be fitted, with the reason."""
-    return {
-        "chosen": None,
-        "verdict": "not identifiable",
-        "reason": reason,
-        "symmetry": None,
-        "candidates": [],
-    }
+    return to_json(Choice((), None, "not identifiable", reason))
 
 
 def _candidate(result: FitResult) -> dict[str, Any]:

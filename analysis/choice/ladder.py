@@ -9,7 +9,7 @@ Fresnel's law, and light scattered inside.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal
+from typing import Literal, get_args
 
 MethodOfFit = Literal["auto", "qualitative", "functional", "exact"]
 """Method for the BRDF of the rough surface; auto: the cheapest that is accurate enough."""
@@ -46,7 +46,7 @@ _EXACT, _FUNCTIONAL = "oren_nayar_exact", "oren_nayar"
 _BY_METHOD = {
     "qualitative": "oren_nayar_qualitative", "functional": _FUNCTIONAL, "exact": _EXACT,
 }  # fmt: skip
-METHODS: tuple[MethodOfFit, ...] = ("auto", "qualitative", "functional", "exact")
+METHODS: tuple[MethodOfFit, ...] = get_args(MethodOfFit)
 
 
 def physics(name: str) -> str:

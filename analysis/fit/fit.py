@@ -19,9 +19,9 @@ from analysis.fit.acceptance_average import AveragedFit, fit_averaged
 from analysis.fit.criteria import OUTLIER_U, SIGNIFICANCE, aicc, bic, noise_variance, probability
 from analysis.fit.first_fit import FirstFit, first_fit
 from analysis.fit.problem import Problem
-from analysis.fit.relative_scale import normalise_lamp_levels, relative_model, unscaled_parameters
+from analysis.fit.relative_scale import normalise_lamp_levels, unscaled_parameters
 from analysis.fit.uncertainty import uncertainty
-from analysis.models import MODELS, Model
+from analysis.models import Model
 from analysis.models.base import Validity
 from instrument.geometry import BoolArray, Brdf, FloatArray, Geometry
 
@@ -145,19 +145,15 @@ def stated_u(result: FitResult, measurements: Measurements) -> dict[str, float]:
     Linearised at the fitted values, without a new fit: to compare the contributions to u. Raises
     `ValueError` where no u is stated.
     """
-    model = MODELS[result.model]
-    if measurements.relative:
-        model = relative_model(model, measurements.brdf)
-    free = [i for i, p in enumerate(model.parameters) if result.u[p.name] is not None]
-
-    def smooth(geometry: Geometry) -> FloatArray:
-        return model.brdf(geometry, **result.values)
-
-    covariance = full_covariance(measurements, smooth)
-    problem = Problem(model, measurements.geometry, measurements.brdf, covariance)
-    J = problem.jacobian(np.array([result.values[p.name] for p in model.parameters]), free)
+    names = list(result.u)
+    free = [i for i, name in enumerate(names) if result.u[name] is not None]
+    if not free:
+        return {}
+    covariance = full_covariance(measurements, result.brdf)
+    problem = Problem(result.problem.model, measurements.geometry, measurements.brdf, covariance)
+    J = problem.jacobian(result.x, free)
     u = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
-    return {model.parameters[i].name: float(value) for i, value in zip(free, u, strict=True)}
+    return {names[i]: float(value) for i, value in zip(free, u, strict=True)}
 
 
 def _solve(

@@ -9,7 +9,7 @@ import pytest
 
 from analysis.data.curet import read_curet
 from analysis.data.measurements import Measurements, SharedError
-from analysis.fit.fit import fit
+from analysis.fit.fit import fit, stated_u
 from analysis.models import MODELS
 from tests.support.analysis.seeded_scan import GLOSSY, scan
 from tests.support.paths import ROOT
@@ -86,6 +86,14 @@ def test_without_stated_u_the_noise_is_estimated() -> None:
     assert found.reduced_chi2 is None
     assert found.values["sigma_deg"] == pytest.approx(30, abs=4 * (found.u["sigma_deg"] or 0))
     assert found.rms_relative == pytest.approx(5e-4, rel=0.3)
+
+
+def test_stated_u_is_that_of_the_fit_and_empty_where_nothing_is_determined() -> None:
+    m = scan("oren_nayar", 1, albedo=0.8, sigma_deg=30)
+    found = fit(MODELS["oren_nayar"], m)
+    assert stated_u(found, m) == pytest.approx(dict(found.u), rel=0.01)
+    relative = replace(m, relative=True)
+    assert stated_u(fit(MODELS["lambert"], relative), relative) == {}
 
 
 CURET = ROOT.parent / "shared" / "data" / "curet"
