@@ -1,4 +1,4 @@
-"""The pinhole camera: where points of the sample appear, and how large."""
+"""Pinhole camera: position and size of the image of points of the sample."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_foreshortening_is_the_cosine_of_the_view_angle(theta_r: float) -> None:
         axis_column_px=319.5,
         axis_row_px=255.5,
         roll_deg=0.0,
-    )  # so far that perspective is gone
+    )  # so far away that there is no perspective
     a, b = upright.project([[-1.0, 0.0], [1.0, 0.0]], theta_r)
     across = 2 * 640 / 72 * np.cos(np.radians(theta_r))
     assert b[0] - a[0] == pytest.approx(across, rel=1e-4)
@@ -63,8 +63,8 @@ def test_the_near_side_of_a_tilted_sample_is_larger() -> None:
     corners = CAMERA.project(rectangle_mm(40, 40), 60.0)
     far = np.linalg.norm(corners[3] - corners[0])
     near = np.linalg.norm(corners[2] - corners[1])
-    way = 800 - np.array([20, -20]) * np.sin(np.radians(60))
-    assert near / far == pytest.approx(way[1] / way[0], rel=2e-3)
+    distance = 800 - np.array([20, -20]) * np.sin(np.radians(60))
+    assert near / far == pytest.approx(distance[1] / distance[0], rel=2e-3)
 
 
 @given(VIEW, st.floats(-15, 15), st.floats(-15, 15))

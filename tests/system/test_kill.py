@@ -1,4 +1,4 @@
-"""A scan that is killed, at any moment, loses no accepted point and goes on to the same result."""
+"""A scan killed at any moment loses no accepted reading and resumes to the same result."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ def nothing_lost(outcome: dict[str, int]) -> bool:
 
 
 @pytest.mark.slow
-def test_killed_at_any_moment_nothing_is_lost_twice_or_different(
+def test_nothing_is_lost_or_changed_by_kills_at_random_moments(
     tmp_path: Path, slow: bool, record_testsuite_property: Callable[[str, object], None]
 ) -> None:
     kills = 1000 if slow else 25
     outcome = json.loads(run_scan_killer([tmp_path, kills, 2026], {}, 3600))
     record_testsuite_property("kills at random moments", outcome)
     assert outcome["kills"] >= kills
-    assert outcome["accepted_before"] > kills  # they were well under way
+    assert outcome["accepted_before"] > kills  # the scans were well under way
     assert outcome["killed_twice"] > 0
     assert nothing_lost(outcome), outcome
 
 
 @pytest.mark.slow
-def test_killed_before_each_thing_that_it_writes_nothing_is_lost_twice_or_different(
+def test_nothing_is_lost_or_changed_by_kills_before_each_file_operation(
     recorder: dict[str, str],
     tmp_path: Path,
     slow: bool,
     record_testsuite_property: Callable[[str, object], None],
 ) -> None:
-    """Every write, fsync, new name and removal of a scan: the journal's boundaries among them."""
+    """Each write, fsync, rename and removal of a scan, those of SQLite's log included."""
     stride = 1 if slow else 23
     environment = recorder | {"GONIO_RECORD_ROOT": str(tmp_path)}
     outcome = json.loads(run_scan_killer([tmp_path, "entries", stride], environment, 3600))

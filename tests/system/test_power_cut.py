@@ -1,4 +1,4 @@
-"""What was accepted is there after a power cut, whatever of the rest the disk has kept."""
+"""Accepted readings survive a power cut, whatever else the disk has kept."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.support.storage.power_cut import MARK, Disk, Entry, entries
 
 @pytest.fixture(scope="module")
 def log(recorder: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A scan that keeps its frames, was stopped once and went on: all that it did to its files."""
+    """Log of all file operations of a scan that keeps frames and was stopped and resumed once."""
     folder = tmp_path_factory.mktemp("power cut")
     (folder / "disk").mkdir()
     environment = recorder | {"GONIO_RECORD_ROOT": str(folder / "disk")}
@@ -31,7 +31,7 @@ def log(recorder: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> P
 
 
 def cuts(log: Path, every: int) -> Iterator[tuple[int, Disk]]:
-    """The disk after each entry, or after every so manieth and each one that accepts something."""
+    """Yield the disk after every n-th entry, and after each that accepts a reading."""
     disk = Disk()
     for number, entry in enumerate(entries(log)):
         disk.do(entry)
@@ -59,7 +59,7 @@ def look(run: Path, accepted: set[int], whole: dict[int, Reading]) -> None:
 
 
 @pytest.mark.slow
-def test_after_a_power_cut_at_any_moment_all_that_was_accepted_is_there(
+def test_all_accepted_readings_survive_a_power_cut_at_any_moment(
     log: Path, tmp_path: Path, slow: bool, record_testsuite_property: Callable[[str, object], None]
 ) -> None:
     root, draws = str(log.parent / "disk"), 4 if slow else 1
@@ -78,8 +78,8 @@ def test_after_a_power_cut_at_any_moment_all_that_was_accepted_is_there(
     record_testsuite_property("power cuts", looked)
 
 
-def test_the_replay_itself_keeps_what_was_synced_and_drops_what_was_not(tmp_path: Path) -> None:
-    """A file is there once it and its folder were synced, and as it was then."""
+def test_the_simulated_disk_keeps_only_what_was_synced(tmp_path: Path) -> None:
+    """A file exists once it and its folder were synced, with its contents at that time."""
 
     def left(*done: Entry) -> dict[str, bytes]:
         disk = Disk()

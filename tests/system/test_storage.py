@@ -1,4 +1,4 @@
-"""A full disk, one closed to us, a folder moved or removed, a clock set back: nothing is lost."""
+"""Full and read-only disks, a moved or removed folder, a clock set back: nothing is lost."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> list[Reading]:
 def at_step(
     monkeypatch: pytest.MonkeyPatch, step: int, happens: Callable[[Devices], Devices | None]
 ) -> None:
-    """Have something happen when the scan begins that step."""
+    """Call `happens` when the scan begins that step."""
 
     def opening(loaded: object) -> Devices:
         devices = open_devices(LOADED)
@@ -74,7 +74,7 @@ def test_a_run_folder_that_is_moved_ends_the_scan_with_its_new_name(
         assert undated(record.readings()) == whole
 
 
-def test_a_run_folder_that_is_removed_is_said_to_be_lost(
+def test_a_removed_run_folder_is_reported_as_lost(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     at_step(monkeypatch, 8, lambda _: shutil.rmtree(tmp_path / "run"))
@@ -83,14 +83,14 @@ def test_a_run_folder_that_is_removed_is_said_to_be_lost(
         pytest.raises(StorageError, match="was removed while the scan ran, and the") as failed,
     ):
         scan(LOADED, PLAN, record)
-    assert "gonio resume" not in str(failed.value)  # there is nothing to go on from
+    assert "gonio resume" not in str(failed.value)  # there is nothing to resume
 
 
 def test_a_clock_that_is_set_back_changes_the_dates_and_nothing_else(
     whole: list[Reading], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class SetBack:
-        """An hour back from a moment on; what only grows goes on growing."""
+        """Clock whose date can be set back; its monotonic time is not affected."""
 
         def __init__(self, clock: Clock) -> None:
             self._clock, self.back = clock, timedelta()
@@ -124,7 +124,7 @@ def test_a_clock_that_is_set_back_changes_the_dates_and_nothing_else(
 
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The demo's foam with a coarse sweep, and a few frames that are kept."""
+    """The demo with a coarse sweep and kept frames."""
     folder = tmp_path_factory.mktemp("protocol")
     text = (CONFIGS / "protocols" / "demo.yaml").read_text()
     text = text.replace("num: 33", "num: 5").replace("frames_per_point: 4", "frames_per_point: 2")
@@ -135,7 +135,7 @@ def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def finished(protocol: Path, tmp_path_factory: pytest.TempPathFactory) -> list[list[str]]:
-    """measurements.csv of a run with room enough."""
+    """measurements.csv of a run on a disk with enough room."""
     folder = tmp_path_factory.mktemp("finished") / "run"
     done = gonio("run", protocol, "--out", folder)
     assert done.returncode == 0, done.stderr
@@ -143,7 +143,7 @@ def finished(protocol: Path, tmp_path_factory: pytest.TempPathFactory) -> list[l
 
 
 def table(run: Path) -> list[list[str]]:
-    """measurements.csv but for the dates."""
+    """Return measurements.csv without the dates."""
     with (run / "measurements.csv").open(newline="") as file:
         rows = list(csv.reader(file))
     dated = rows[0].index("time_utc")
@@ -163,7 +163,7 @@ def on_a_disk(
 
 # Bytes written: into a frame, into the record, and before there is a record at all.
 @pytest.mark.parametrize("quota", [9_000_000, 2_500_000])
-def test_a_full_disk_ends_the_scan_and_with_more_room_it_goes_on(
+def test_a_full_disk_ends_the_scan_which_resumes_with_more_room(
     quota: int,
     protocol: Path,
     finished: list[list[str]],
@@ -187,7 +187,7 @@ def test_a_full_disk_ends_the_scan_and_with_more_room_it_goes_on(
     assert table(run) == finished
 
 
-def test_a_disk_that_is_full_before_the_run_has_begun_leaves_nothing_behind(
+def test_a_disk_that_is_full_at_the_start_leaves_no_folder(
     protocol: Path, recorder: dict[str, str], tmp_path: Path
 ) -> None:
     run = tmp_path / "disk" / "run"
@@ -198,7 +198,7 @@ def test_a_disk_that_is_full_before_the_run_has_begun_leaves_nothing_behind(
     assert not run.exists()
 
 
-def test_a_read_only_folder_is_named_and_what_is_in_it_stays(
+def test_a_read_only_folder_is_named_and_left_unchanged(
     protocol: Path, recorder: dict[str, str], tmp_path: Path
 ) -> None:
     disk = tmp_path / "disk"

@@ -12,7 +12,7 @@ from tests.support.config.mistakes import CHECK_MISTAKES, PROTOCOL_MISTAKES, RIG
 from tests.support.config.texts import PROTOCOL, RIG, changed, load, problems
 
 
-def test_sound_files_load_with_their_texts() -> None:
+def test_valid_files_load_with_their_texts() -> None:
     loaded = load()
     assert loaded.protocol_text == PROTOCOL
     assert loaded.rig_text == RIG
@@ -24,14 +24,14 @@ def test_sound_files_load_with_their_texts() -> None:
     assert loaded.rig == load_rig(Path("rig.yaml"))
 
 
-def test_whole_numbers_stand_for_numbers() -> None:
+def test_whole_numbers_are_accepted_as_floats() -> None:
     loaded = load()
     assert isinstance(loaded.rig.lamp_distance_mm, float)
     assert loaded.protocol.simulated_sample is not None
     assert isinstance(loaded.protocol.simulated_sample.parameters["sigma_deg"], float)
 
 
-def test_sound_parts_are_checked_while_others_are_broken() -> None:
+def test_valid_parts_are_checked_although_others_are_not_valid() -> None:
     protocol = changed(PROTOCOL, "60.0]", "85.0, sixty]")
     protocol = changed(protocol, "{width_mm: 20.0, height_mm: 20.0}", "{width_mm: 80.0}")
     rig = changed(RIG, "name: small", "nam: small")
@@ -55,14 +55,14 @@ def test_a_default_view_angle_is_checked_too() -> None:
     )
 
 
-def test_yaml_mistakes_and_those_of_the_schema_come_together() -> None:
+def test_mistakes_of_yaml_and_of_the_schema_are_reported_together() -> None:
     protocol = changed(PROTOCOL, "name: foam\n", "name: &n foam\nname: bread\n")
     protocol = changed(protocol, "0.99", "*n")
     protocol = changed(protocol, "num: 33", "num: x")
     assert [p.split(":")[1] for p in problems(protocol)] == ["1", "2", "8", "13"]
 
 
-def test_what_cannot_be_read_is_told_along_with_the_other_file() -> None:
+def test_a_file_that_cannot_be_read_does_not_hide_mistakes_of_the_other() -> None:
     found = problems(changed(PROTOCOL, "0.7", "7"), RIG + "x: [")
     assert [p.split(": ")[0] for p in found] == ["protocol.yaml:10:18", "rig.yaml:35:5"]
 
@@ -81,7 +81,7 @@ def test_a_rig_given_by_hand_overrides_the_named_one() -> None:
     assert loaded.rig_path == Path("other.yaml")
 
 
-def test_the_rig_is_found_from_the_protocol_not_from_here() -> None:
+def test_the_rig_is_found_relative_to_the_protocol() -> None:
     for folder in ("protocols", "rigs"):
         Path(folder).mkdir()
     path = Path("protocols/protocol.yaml")

@@ -1,4 +1,4 @@
-"""The shipped configuration files: they load, on every rig, and say what the paper says."""
+"""Shipped configuration files load on every rig and agree with the paper."""
 
 from pathlib import Path
 
@@ -20,19 +20,19 @@ def protocol(stem: str) -> Loaded:
     return load_protocol(CONFIGS / "protocols" / f"{stem}.yaml")
 
 
-def test_no_configuration_file_stands_elsewhere() -> None:
+def test_all_configuration_files_are_in_the_two_folders() -> None:
     assert sorted(CONFIGS.rglob("*.y*ml")) == sorted(PROTOCOLS + RIGS)
     assert PROTOCOLS
     assert RIGS
 
 
 @pytest.mark.parametrize("path", RIGS, ids=name)
-def test_a_rig_loads_and_is_called_like_its_file(path: Path) -> None:
+def test_a_rig_loads_and_is_named_like_its_file(path: Path) -> None:
     assert load_rig(path).name == path.stem
 
 
 @pytest.mark.parametrize("path", PROTOCOLS, ids=name)
-def test_a_protocol_loads_and_is_called_like_its_file(path: Path) -> None:
+def test_a_protocol_loads_and_is_named_like_its_file(path: Path) -> None:
     assert load_protocol(path).protocol.name == path.stem
 
 

@@ -1,4 +1,4 @@
-"""Files that cannot be read are named, with what stands beside them."""
+"""A file that cannot be read is named, with the files beside it."""
 
 import os
 from pathlib import Path

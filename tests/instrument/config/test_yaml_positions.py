@@ -1,4 +1,4 @@
-"""YAML as data with places: what is read, what is refused, and where."""
+"""YAML data with positions: accepted words, refused features, hints."""
 
 import math
 
@@ -109,7 +109,7 @@ def test_number_hint_for_a_whole_number() -> None:
     assert number_hint("1e5", whole=True) == "write 100000"
 
 
-def test_places_of_keys_and_values() -> None:
+def test_positions_of_keys_and_values() -> None:
     marked = read("# head\na: 1\nb:\n  - {c: x,  d: [10, 20]}\n")
     assert marked.values[("a",)] == Mark(2, 4)
     assert marked.keys[("b",)] == Mark(3, 1)
@@ -128,7 +128,7 @@ def test_keys_are_always_text() -> None:
     assert read("1: a\ntrue: b\n~: c\n").data == {"1": "a", "true": "b", "~": "c"}
 
 
-def test_every_double_key_is_told_and_the_first_kept() -> None:
+def test_every_duplicate_key_is_reported_and_the_first_kept() -> None:
     text = "a: 1\nb: 2\na: 3\nc: {d: 1, d: 2}\na: 4\n"
     assert mistakes(text) == [
         (3, 1, "duplicate key, first at line 1, column 1; keep one of them"),
@@ -157,7 +157,9 @@ def test_every_double_key_is_told_and_the_first_kept() -> None:
         ("a: 1\nb: \x07\n", 2, 4, "character"),
     ],
 )
-def test_refused_with_its_place(text: str, line: int, column: int, words: str) -> None:
+def test_a_refused_feature_is_reported_with_its_position(
+    text: str, line: int, column: int, words: str
+) -> None:
     found = mistakes(text)
     assert any((at, col) == (line, column) and words in what for at, col, what in found), found
 
@@ -167,7 +169,7 @@ def test_several_mistakes_are_collected() -> None:
     assert [line for line, _, _ in mistakes(text)] == [1, 2, 3, 4, 6]
 
 
-def test_many_laughs_are_not_laid_out() -> None:
+def test_nested_aliases_are_not_expanded() -> None:
     rows = ["a: &a [l, l, l, l]"]
     rows += [
         f"{b}: &{b} [*{a}, *{a}, *{a}, *{a}]" for a, b in zip("abcdefg", "bcdefgh", strict=True)
@@ -232,7 +234,7 @@ _YAML_SIGNS = st.text(alphabet="ab01.:-_ \n\t[]{},&*!|>?'\"#%@<=~e+\\\u2028é\x0
 
 @settings(max_examples=300, deadline=None)
 @given(_YAML_SIGNS)
-def test_any_text_is_read_or_told_what_is_wrong(text: str) -> None:
+def test_any_text_is_read_or_has_a_mistake(text: str) -> None:
     marked = read(text)
     assert marked.readable or marked.mistakes
     assert all(m.mark.line >= 1 and m.mark.column >= 1 for m in marked.mistakes)
@@ -240,7 +242,7 @@ def test_any_text_is_read_or_told_what_is_wrong(text: str) -> None:
 
 @settings(max_examples=100, deadline=None)
 @given(st.binary(max_size=60))
-def test_any_bytes_are_read_or_told_what_is_wrong(raw: bytes) -> None:
+def test_any_bytes_are_read_or_have_a_mistake(raw: bytes) -> None:
     marked = read_yaml(raw)
     assert marked.readable or marked.mistakes
 

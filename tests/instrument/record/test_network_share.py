@@ -22,7 +22,7 @@ broken line
     [("/home/run", None), ("/lab/run", "nfs4"), ("/lab/local/run", None), ("/laboratory", None),
      ("/with blank/a/b", "cifs"), ("/far", "fuse.sshfs")],
 )  # fmt: skip
-def test_a_network_share_is_told_by_its_mount(tmp_path: Path, folder: str, kind: str) -> None:
+def test_a_network_share_is_recognised_by_its_mount(tmp_path: Path, folder: str, kind: str) -> None:
     (tmp_path / "mounts").write_text(MOUNTS)
     assert network_share(Path(folder), tmp_path / "mounts") == kind
     assert network_share(Path(folder), tmp_path / "none") is None

@@ -1,4 +1,4 @@
-"""The run record: on disk at once, readable by others, refused where it is not ours."""
+"""Run record: durable at once, readable during the scan, refused if it is foreign."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from instrument.record.record import FILE_NAME, Record
 from tests.support.storage.sample_records import reading
 
 
-def test_what_was_added_is_read_back_as_it_was(tmp_path: Path) -> None:
+def test_added_rows_are_read_back_unchanged(tmp_path: Path) -> None:
     rows = [reading(0), reading(1, kind="tile", flags="saturated")]
     picture = Preview(1, "a view", b"\x89PNG", [[0.0, 1.5], [2.0, 3.0]])
     with Record.create(tmp_path / "run", {"protocol": "text"}) as record:

@@ -1,4 +1,4 @@
-"""The schema of the record: unchanging, one column for each value, enforced when a row is written.
+"""Schema of the record: unchanged once released, a column for each value, enforced on writing.
 
 The rules against forged files are tested in `test_validation`.
 """

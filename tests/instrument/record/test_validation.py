@@ -17,7 +17,7 @@ from tests.support.strangers.run_folders import REFUSED, Sent, copy_of
 
 @pytest.fixture(params=[4, 3])
 def sent(tmp_path: Path, request: pytest.FixtureRequest) -> Sent:
-    """A small record that was sent, of each schema version."""
+    """A received small record, in each schema version."""
     small_record(tmp_path / "run").close()
     return copy_of(tmp_path / "run", tmp_path, request.param)
 
@@ -69,7 +69,7 @@ def test_a_wrong_value_is_named_with_table_row_column_and_what_is_allowed(sent: 
 def test_previews_too_large_together_are_refused(
     sent: Sent, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The limits themselves are hundreds of MB; here they are smaller, so that less is written."""
+    """The limit itself is 512 MB; it is smaller here, so that less is written."""
     monkeypatch.setattr(validation, "_MOST_PREVIEW_BYTES", 9_000_000)
     sent.forge("UPDATE preview SET png = zeroblob(2000000)")
     with pytest.raises(InputError, match="pictures of 10000000 bytes; allowed: 9000000"):
@@ -91,7 +91,7 @@ def test_more_than_can_be_reduced_is_refused(sent: Sent, monkeypatch: pytest.Mon
 
 @pytest.mark.slow
 def test_any_damage_to_a_record_gives_a_result_or_an_input_error(sent: Sent, slow: bool) -> None:
-    """Whatever is read of a record at all is read here."""
+    """All readers of a record are called."""
 
     def read(data: bytes) -> None:
         for name in ("", "-wal", "-shm"):

@@ -11,7 +11,7 @@ from instrument.errors import StorageError
 from instrument.text.atomic_file import read_file, write_whole
 
 
-def test_a_file_is_written_whole_or_its_old_self_stays(
+def test_a_failed_write_leaves_the_old_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "fit.json"
@@ -27,8 +27,8 @@ def test_a_file_is_written_whole_or_its_old_self_stays(
     assert [p.name for p in tmp_path.iterdir()] == ["fit.json"]
 
 
-def test_no_link_leads_what_is_written_elsewhere(tmp_path: Path) -> None:
-    """Neither under the file's own name nor under the temporary one."""
+def test_a_link_in_the_way_is_replaced_not_followed(tmp_path: Path) -> None:
+    """Under the name of the file and under the temporary one."""
     victim = tmp_path / "mine.txt"
     victim.write_text("mine")
     for name in ("fit.json", f".fit.json.{os.getpid()}.part"):

@@ -7,7 +7,7 @@ import pytest
 from instrument.text.terminal_safe import escape_control_characters, first_unfit
 
 
-def test_what_is_harmless_is_left_alone() -> None:
+def test_printable_text_is_unchanged() -> None:
     plain = "Schaumstoff – 石膏 – ρ = 0,8\u00a0% (à 20\u2009°C)\n\tθᵢ ±2°"
     assert escape_control_characters(plain) == plain
     assert escape_control_characters("a\x1bb\ud800") == "a\\x1bb\\ud800"

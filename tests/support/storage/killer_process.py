@@ -1,4 +1,4 @@
-"""Runs `scan_killer` in a process of its own."""
+"""Start of `scan_killer` in a process of its own."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.support.paths import ROOT
 
 
 def run_scan_killer(arguments: list[object], environment: dict[str, str], timeout_s: float) -> str:
-    """Run the killer under the environment; return what it printed."""
+    """Run the killer with extra environment variables and return its output."""
     done = subprocess.run(
         [sys.executable, "-m", "tests.support.storage.scan_killer", *map(str, arguments)],
         env={**os.environ, **environment}, cwd=ROOT,

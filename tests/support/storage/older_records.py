@@ -1,4 +1,4 @@
-"""Records as earlier versions of the program made them."""
+"""Records in the schemas of earlier versions of the program."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""What a disk may hold after a power cut, from a log of the write recorder.
+"""Simulated disk after a power cut, from a log of the write recorder.
 
-Only what was synced is sure to be there: of a file what was written before its last fsync, of a
-folder the names that it had at its last one. The rest may be there in part, in any order, and the
-last of it torn at a sector. (POSIX, fsync; that some file systems promise more is not made use of.)
+Only synced data are certain: of a file, what was written before its last fsync; of a folder, the
+names at its last fsync. Other writes may be present or missing in any order, and torn at a sector.
+(POSIX fsync; stronger guarantees of some file systems are not used.)
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SECTOR = 512
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One thing that was done: `number` is an inode, or a mark's number."""
+    """One file operation; `number` is an inode, or the number of a mark."""
 
     kind: int
     number: int
@@ -31,7 +31,7 @@ class Entry:
 
 
 def entries(log: Path) -> Iterator[Entry]:
-    """All entries of a log, in order."""
+    """Yield all entries of a log, in order."""
     data, at = log.read_bytes(), 0
     while at < len(data):
         kind, number, offset, length, path_size, size = _HEAD.unpack_from(data, at)
@@ -56,18 +56,18 @@ def _applied(content: bytes, entry: Entry) -> bytes:
 
 
 class Disk:
-    """A disk that keeps what was synced apart from what was not."""
+    """Disk that separates synced from unsynced data."""
 
     def __init__(self) -> None:
         self._files: list[_File] = [_File()]
-        self._of_inode: dict[int, int] = {}  # an inode's number is used again once its file is gone
-        self._names: dict[str, int] = {}  # as the process sees them: which file; a folder is 0
+        self._of_inode: dict[int, int] = {}  # inode numbers are reused after removal
+        self._names: dict[str, int] = {}  # as the process sees them; a folder is 0
         self._synced: dict[str, int] = {}
         self._changes: dict[str, list[tuple[str, int | None]]] = {}  # by folder, not yet synced
         self.accepted: set[int] = set()
 
     def do(self, entry: Entry) -> None:
-        """Take the next entry of the log."""
+        """Apply the next entry of the log."""
         if entry.kind == MARK:
             self.accepted.add(entry.number)
         elif entry.kind in (WRITE, TRUNCATE):
@@ -99,7 +99,7 @@ class Disk:
             self._changes.setdefault(str(Path(name).parent), []).append((name, number))
 
     def cut(self, folder: Path, root: str, draw: random.Random | None) -> None:
-        """Write what is left into a folder: only what was synced, or with `draw` more of it."""
+        """Write into a folder the synced data and, with `draw`, a random part of the rest."""
         names = dict(self._synced)
         for changes in self._changes.values():
             kept = draw.randint(0, len(changes)) if draw else 0
@@ -109,7 +109,7 @@ class Disk:
             path = folder / Path(name).relative_to(root)
             above = [str(p) for p in Path(name).parents if len(str(p)) > len(root)]
             if any(names.get(p) != 0 for p in above):
-                continue  # its folder is lost, and it with it
+                continue  # lost together with its folder
             if names[name] == 0:
                 path.mkdir()
             else:

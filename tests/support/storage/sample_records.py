@@ -10,7 +10,7 @@ from instrument.record.record import Record
 
 
 def reading(step: int = 0, **changes: object) -> Reading:
-    """A plausible reading; `changes` replace its values by name."""
+    """Return a plausible reading; `changes` replace its values by name."""
     values: dict[str, object] = {
         "step": step, "kind": "point", "surface": "sample", "theta_i_deg": 30.0, "dphi_deg": 0.0,
         "theta_r_deg": -20.0, "lamp_setting": 0, "block": 0, "signal_dn": 2000.5,
@@ -24,7 +24,7 @@ def reading(step: int = 0, **changes: object) -> Reading:
 
 
 def small_record(folder: Path) -> Record:
-    """A new record, open, with at least one row in each table."""
+    """Create a record with at least one row in each table, and leave it open."""
     record = Record.create(folder, {"steps": "5", "hidden": "0", "protocol": "name: größer"})
     record.add_device("camera", "maker, model, serial number")
     record.add_settings("2026", "camera", {"gain": "1"})

@@ -1,9 +1,9 @@
-"""Kills scans with SIGKILL and looks at what they leave; a process of its own, so that it can fork.
+"""Scans that are killed with SIGKILL, and checks of what they leave; a process that can fork.
 
-`FOLDER KILLS SEED` kills at random moments, `FOLDER entries STRIDE` before every STRIDE-th thing
-that the scan does to its files (under the write recorder); both print what came of it as JSON.
-`FOLDER record LOG` kills nothing: it has the recorder write down a scan that keeps its frames, is
-stopped once, and goes on.
+`FOLDER KILLS SEED` kills at random moments, `FOLDER entries STRIDE` before every STRIDE-th file
+operation of the scan (under the write recorder); both print the outcome as JSON.
+`FOLDER record LOG` kills nothing: the recorder logs a scan that keeps its frames and is stopped and
+resumed once.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from tests.support.scans import changed, small_scan, undated
 
 @dataclass
 class Outcome:
-    """Counted over all kills; all but the first three must stay 0."""
+    """Counts over all kills; all but the first three must stay 0."""
 
     kills: int = 0
     killed_twice: int = 0
@@ -48,7 +48,7 @@ class Outcome:
 
 
 def scan(folder: Path, loaded: Loaded, plan: Plan, told: Callable[[int], None]) -> None:
-    """Begin the scan in that folder, or go on with it; `told` hears of each accepted step."""
+    """Start or resume the scan in that folder; `told` is called with each accepted step."""
 
     def on_step(step: Step) -> None:
         told(step.index)
@@ -62,7 +62,7 @@ def scan(folder: Path, loaded: Loaded, plan: Plan, told: Callable[[int], None]) 
 
 
 def opened(folder: Path) -> Record:
-    """The run's record; one that had not begun is begun anew, as its message says."""
+    """Open the record of the run; replace one that had not begun, as its message advises."""
     if folder.exists():
         try:
             return Record.open(folder)
@@ -74,13 +74,13 @@ def opened(folder: Path) -> Record:
 
 
 class Killer:
-    """Forks scans and kills them."""
+    """Scans in forked processes that are killed."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._loaded = small_scan()
         self._plan = make_plan(self._loaded)
-        scan(folder / "whole", self._loaded, self._plan, lambda _: None)  # warms everything up
+        scan(folder / "whole", self._loaded, self._plan, lambda _: None)  # fills the caches
         with Record.open(folder / "whole") as record:
             self._whole = undated(record.readings())
             self._brdf = self._reduced(record)
@@ -91,7 +91,7 @@ class Killer:
         return [float(value) for value in reduced.brdf]
 
     def killed(self, run: Path, waits: Callable[[int], None], at: int = -1) -> set[int]:
-        """Start or resume in a fork, kill it once `waits` returns; the steps it told of."""
+        """Run or resume in a fork, kill it once `waits` returns, and return its accepted steps."""
         ours, theirs = os.pipe()
         child = os.fork()
         if child == 0:
@@ -113,7 +113,7 @@ class Killer:
             os._exit(0)
 
     def look(self, run: Path, accepted: set[int]) -> None:
-        """What a killed scan has left: everything that it told of, nothing twice, in order."""
+        """Count what a killed scan has lost, duplicated or changed."""
         self.outcome.kills += 1
         self.outcome.accepted_before += len(accepted)
         with opened(run) as record:
@@ -125,7 +125,7 @@ class Killer:
         self.outcome.unequal += found != self._whole[: len(found)]
 
     def finish(self, run: Path) -> None:
-        """Go on to the end; the result is that of the scan which nobody killed."""
+        """Resume to the end; count results that differ from those of the scan without kills."""
         scan(run, self._loaded, self._plan, lambda _: None)
         with Record.open(run) as record:
             self.outcome.results_unequal += undated(record.readings()) != self._whole
@@ -136,7 +136,7 @@ class Killer:
 
 def _after(seconds: float) -> Callable[[int], None]:
     def waits(child: int) -> None:
-        time.sleep(seconds)  # the moment of the kill is what is drawn: nothing is waited for
+        time.sleep(seconds)  # the random moment of the kill; no event is awaited
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
 
@@ -144,7 +144,7 @@ def _after(seconds: float) -> Callable[[int], None]:
 
 
 def at_random(killer: Killer, folder: Path, kills: int, seed: int) -> None:
-    """Some scans are killed again while they go on."""
+    """Kill at random moments; some scans are killed again after they resume."""
     draw, run = random.Random(seed), folder / "run"
     begun_s = time.monotonic()
     scan(folder / "timed", killer._loaded, killer._plan, lambda _: None)
@@ -160,13 +160,13 @@ def at_random(killer: Killer, folder: Path, kills: int, seed: int) -> None:
 
 
 def at_entries(killer: Killer, folder: Path, stride: int) -> None:
-    """Before every entry of what the scan does to its files, until it is through."""
+    """Kill before every n-th file operation, until the scan finishes."""
     run, at, ended = folder / "run", 1, [-1]
 
     def waits(child: int) -> None:
         ended.append(os.waitpid(child, 0)[1])
 
-    while ended[-1] != 0:  # until nobody kills it: there are no more entries
+    while ended[-1] != 0:  # until no kill happens: there are no more entries
         steps = killer.killed(run, waits, at)
         killer.look(run, steps)
         killer.finish(run)
@@ -174,7 +174,7 @@ def at_entries(killer: Killer, folder: Path, stride: int) -> None:
 
 
 def recorded(folder: Path, log: Path) -> None:
-    """What a scan does to its files, with a mark after each step that it has accepted."""
+    """Log the file operations of a scan, with a mark after each accepted step."""
     loaded = changed(small_scan(), keep_frames=True)
     plan, recorder = make_plan(loaded), ctypes.CDLL(None)
 

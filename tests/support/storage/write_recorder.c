@@ -1,10 +1,10 @@
-/* Writes down, in order, what a process does to the files below a folder; loaded with LD_PRELOAD.
+/* Log of all operations of a process on files below a folder; loaded with LD_PRELOAD.
  *
- * GONIO_RECORD_ROOT: the folder. GONIO_RECORD_QUOTA: so many bytes may be written there, then the
- * disk is full. GONIO_RECORD_READ_ONLY: nothing may be. recorder_begin(path) starts a log, recorder_mark(n) puts a mark
- * into it, recorder_kill_at(n) has the process die with SIGKILL before its n-th entry.
- * An entry: six 64-bit numbers (kind, inode, offset, length, path's length, data's length), then
- * the path and the data.
+ * GONIO_RECORD_ROOT: the folder. GONIO_RECORD_QUOTA: bytes that can be written there before the
+ * disk is full. GONIO_RECORD_READ_ONLY: nothing can be written. recorder_begin(path) starts a log,
+ * recorder_mark(n) adds a mark, recorder_kill_at(n) sends SIGKILL before the n-th entry.
+ * An entry: six 64-bit numbers (kind, inode, offset, length, length of the path, length of the
+ * data), then the path and the data.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -54,7 +54,7 @@ static int64_t watched(int fd, struct stat *st, char *path) {
     return below_root(path) && fstat(fd, st) == 0 ? (int64_t)st->st_ino : 0;
 }
 
-/* Whether the write may be done; where it may not, errno says why. */
+/* Return 1 if the write is allowed, else 0 with errno set. */
 static int may_write(int fd, int64_t offset, const void *data, ssize_t size) {
     static int64_t written;
     struct stat st;
@@ -70,7 +70,7 @@ static int may_write(int fd, int64_t offset, const void *data, ssize_t size) {
     return 1;
 }
 
-/* Whether a name or a file below the root must be left as it is. */
+/* Return 1, with errno set, if a file below the root must not be changed. */
 static int read_only(const char *path) {
     if (!getenv("GONIO_RECORD_READ_ONLY") || !below_root(path)) return 0;
     errno = EROFS;
@@ -138,7 +138,7 @@ static void synced(int fd) {
     int64_t inode = watched(fd, &st, path);
     if (inode) entry(S_ISDIR(st.st_mode) ? SYNC_FOLDER : SYNC, inode, 0, 0, path, "", "", 0);
 }
-/* What is synced counts from the moment at which the call has returned. */
+/* Data count as synced once the call has returned. */
 int fsync(int fd) { int done = REAL(fsync)(fd); if (done == 0) synced(fd); return done; }
 int fdatasync(int fd) { int done = REAL(fdatasync)(fd); if (done == 0) synced(fd); return done; }
 

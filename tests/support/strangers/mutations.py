@@ -1,6 +1,6 @@
-"""Valid inputs made hostile: a seeded mutator, and the loop that feeds what it makes to a reader.
+"""Mutation of valid inputs with a seed, and the loop that feeds the mutations to a reader.
 
-`Mutator(examples, seed)(n)` gives the same bytes every time, so a failure is seen again from the
+`Mutator(examples, seed)(n)` returns the same bytes every time, so a failure is reproduced from the
 seed and the number in its message.
 """
 
@@ -29,9 +29,9 @@ MOST_CHANGES = 3
 
 
 class Mutator:
-    """Makes input number n from one of the examples: a few changes of all kinds, one upon another.
+    """Generator of input number n: one of the examples with a few changes of different kinds.
 
-    `words` are further pieces that hurt the format at hand.
+    `words` are further pieces of text that may upset the format in question.
     """
 
     def __init__(self, examples: Sequence[bytes], seed: int, words: Sequence[bytes] = ()) -> None:
@@ -39,12 +39,12 @@ class Mutator:
         self.words = (*WORDS, *NUMBERS, *words)
 
     def __call__(self, number: int) -> bytes:
-        """Input number n."""
+        """Return input number n."""
         rng = random.Random(self.seed * 1_000_003 + number)
         return self.spoil(rng, rng.choice(self.examples))
 
     def spoil(self, rng: random.Random, data: bytes) -> bytes:
-        """One example changed."""
+        """Return one example with a few changes."""
         for _ in range(rng.randint(1, MOST_CHANGES)):
             data = rng.choice(_CHANGES)(self, rng, data)
         return data
@@ -54,7 +54,7 @@ class Mutator:
 
 
 def _span(rng: random.Random, data: bytes) -> tuple[int, int]:
-    """A piece of the data, most often a short one."""
+    """Return start and end of a random piece of the data, usually a short one."""
     start = rng.randint(0, len(data))
     length = min(int(rng.expovariate(0.1)), len(data) - start)
     return start, start + length
@@ -111,7 +111,7 @@ def _number(_: Mutator, rng: random.Random, data: bytes) -> bytes:
 
 
 def _line(_: Mutator, rng: random.Random, data: bytes) -> bytes:
-    """Lines in another order, or one many times, or under other ends."""
+    """Return the lines in another order, one repeated, or with other line ends."""
     lines = data.splitlines(keepends=True)
     if not lines:
         return data
@@ -129,7 +129,7 @@ def _line(_: Mutator, rng: random.Random, data: bytes) -> bytes:
 
 
 def _encoded(_: Mutator, rng: random.Random, data: bytes) -> bytes:
-    if rng.random() < 0.8:  # nothing of the example is left to be read after it
+    if rng.random() < 0.8:  # otherwise hardly any input would be readable
         return _flip(_, rng, data)
     return data.decode("utf-8", "replace").encode(rng.choice(_ENCODINGS), "replace")
 
@@ -139,15 +139,15 @@ _CHANGES: tuple[Callable[[Mutator, random.Random, bytes], bytes], ...] = (
     _line, _encoded,
 )  # fmt: skip
 
-LEAKED_BLOCKS = 0.2  # an input, once all caches are warm; a leaked object is one block or more
-LEAKED_BYTES = 32 * 1024**2  # in the last half of all inputs: blocks that are large
-SLOWEST_S = 5.0  # of CPU time; an input takes milliseconds, and other programs may interrupt
+LEAKED_BLOCKS = 0.2  # per input, once all caches are filled; a leaked object is one block or more
+LEAKED_BYTES = 32 * 1024**2  # in the second half of all inputs: for large blocks
+SLOWEST_S = 5.0  # of CPU time; an input takes milliseconds
 
 
 def feed(inputs: Callable[[int], bytes], count: int, read: Callable[[bytes], object]) -> None:
-    """Have `read` take each of `count` inputs: it must not fail, take long, or keep memory.
+    """Call `read` with each of `count` inputs: it must not fail, take long, or leak memory.
 
-    What `read` raises is raised again with the input's number and bytes.
+    Its exceptions are raised again with the number and the bytes of the input.
     """
     half = _Memory()
     for number in range(count):
@@ -166,7 +166,7 @@ def feed(inputs: Callable[[int], bytes], count: int, read: Callable[[bytes], obj
 
 
 class _Memory:
-    """How much the process holds: blocks of the interpreter, and pages in all."""
+    """Memory of the process: blocks of the interpreter, and bytes in total."""
 
     def __init__(self) -> None:
         gc.collect()
@@ -175,7 +175,7 @@ class _Memory:
         self.bytes = 4096 * int(pages.read_text().split()[1]) if pages.exists() else 0
 
     def compare(self, before: _Memory, inputs: int) -> None:
-        """Fail where more has been kept since than caches explain."""
+        """Fail if more memory has been kept since `before` than caches explain."""
         kept = self.blocks - before.blocks
         assert kept < 2000 + LEAKED_BLOCKS * inputs, f"{kept} blocks kept by {inputs} inputs"
         grown = self.bytes - before.bytes

@@ -1,4 +1,4 @@
-"""Run folders from strangers: one sound run, as each schema version, and changes to its record."""
+"""Run folders from elsewhere: a valid run in each schema version, and changes to its record."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SCRIPT = "<script>alert(1)</script>"
 
 @dataclass(frozen=True)
 class Sent:
-    """A folder that was sent, and a file of the receiver's outside it that must stay as it is."""
+    """A received run folder, and a file outside it that must not change."""
 
     folder: Path
     victim: Path
@@ -30,14 +30,14 @@ class Sent:
         return self.folder / FILE_NAME
 
     def sql(self, *statements: str) -> None:
-        """Run statements as any SQLite tool does: the rules of the tables hold."""
+        """Run statements as any SQLite tool does, under the rules of the tables."""
         with closing(sqlite3.connect(self.record)) as database:
             for statement in statements:
                 database.execute(statement)
             database.commit()
 
     def forge(self, *statements: str) -> None:
-        """Run statements as if the tables had no rules, and leave their schema as it was."""
+        """Run statements as if the tables had no rules, and restore the text of the schema."""
         with closing(sqlite3.connect(self.record, isolation_level=None)) as database:
             own = database.execute("SELECT sql, name FROM sqlite_schema WHERE sql IS NOT NULL")
             texts = own.fetchall()
@@ -49,7 +49,7 @@ class Sent:
             _write_schema(database, texts)
 
     def widen(self, old: str, new: str) -> None:
-        """Change the text of the schema itself, so that SQLite enforces fewer rules."""
+        """Change the text of the schema, so that SQLite enforces fewer rules."""
         with closing(sqlite3.connect(self.record, isolation_level=None)) as database:
             rows = database.execute("SELECT sql, name FROM sqlite_schema").fetchall()
             changed = [(text.replace(old, new), name) for text, name in rows if old in (text or "")]
@@ -57,7 +57,7 @@ class Sent:
             _write_schema(database, changed)
 
     def link(self, name: str) -> None:
-        """Put a link to the receiver's file in place of one of the folder's."""
+        """Replace a file of the folder by a link to the file outside."""
         (self.folder / name).unlink(missing_ok=True)
         (self.folder / name).symlink_to(self.victim)
 
@@ -65,7 +65,7 @@ class Sent:
 def _write_schema(database: sqlite3.Connection, texts: list[tuple[str, str]]) -> None:
     database.execute("PRAGMA writable_schema = ON")
     database.executemany("UPDATE sqlite_schema SET sql = ? WHERE name = ?", texts)
-    database.execute("PRAGMA writable_schema = RESET")  # has the tables read anew
+    database.execute("PRAGMA writable_schema = RESET")  # makes SQLite read the schema again
 
 
 def run_few_points(folder: Path) -> Path:
@@ -79,7 +79,7 @@ def run_few_points(folder: Path) -> Path:
 
 
 def copy_of(run: Path, to: Path, version: int = 4) -> Sent:
-    """The run as it was sent, in its own folder of `to`, its record of that schema version."""
+    """Copy a run into a folder of `to`, its record in that schema version."""
     shutil.copytree(run, to / "sent")
     victim = to / "mine.txt"
     victim.write_text("my own\n")
@@ -120,7 +120,7 @@ def _fifo(sent: Sent) -> None:
     os.mkfifo(sent.record)
 
 
-# What was done to the record, and what the refusal says.
+# A change to the record, and words of the refusal.
 REFUSED: dict[str, tuple[Callable[[Sent], None], str]] = {
     "a view in place of the readings": (_view, "holds the view 'reading'"),
     "a view without end in place of meta": (_view_of_meta, "holds the view 'meta'"),

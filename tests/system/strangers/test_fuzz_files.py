@@ -1,7 +1,7 @@
-"""Files of any content: a result, or an `InputError` that says where; never anything else.
+"""Fuzzed files: the readers return a result or raise an `InputError` with the position.
 
-Valid files are spoilt byte by byte and, for YAML, value by value. An error stands in the form that
-the format promises, fits into a terminal, and no input costs much time or any memory.
+Valid files are mutated byte by byte and, for YAML, value by value. Each error has the promised form
+and is safe for a terminal, and no input takes long or leaks memory.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _PLACE = re.compile(r":[0-9]+:[0-9]+: ")
 
 
 def _said(error: InputError, *names: object) -> tuple[str, ...]:
-    """An error's lines, each of which names its file and harms no terminal."""
+    """Return the lines of an error, each of which names its file and is safe for a terminal."""
     problems = error.problems
     assert problems
     for line in problems:
@@ -63,7 +63,7 @@ def shipped(*folders: str) -> list[bytes]:
 
 
 def _in_other_form(rng: random.Random, text: bytes) -> bytes:
-    """One value of a YAML file replaced, taken out or put elsewhere."""
+    """Return a YAML file with one value replaced, removed or moved."""
     data = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     parents = list(_blocks(data))
     parent, other = rng.choice(parents), rng.choice(parents)
@@ -86,7 +86,7 @@ def _blocks(data: object) -> list[dict[object, object] | list[object]]:
 
 
 class YamlMutator(Mutator):
-    """Every other input keeps to the form of YAML and is wrong in what it says."""
+    """Mutator of which every other input is valid YAML with wrong values."""
 
     def __call__(self, number: int) -> bytes:
         rng = random.Random(self.seed * 7_000_003 + number)
@@ -95,7 +95,7 @@ class YamlMutator(Mutator):
 
 
 @pytest.mark.slow
-def test_any_protocol_is_read_or_refused_with_the_place(slow: bool, tmp_path: Path) -> None:
+def test_a_fuzzed_protocol_is_read_or_refused_with_its_position(slow: bool, tmp_path: Path) -> None:
     path, rig = tmp_path / "p.yaml", tmp_path / "rig.yaml"
     rig.write_text(RIG)
 
@@ -114,7 +114,7 @@ def test_any_protocol_is_read_or_refused_with_the_place(slow: bool, tmp_path: Pa
 
 
 @pytest.mark.slow
-def test_any_rig_is_read_or_refused_with_the_place(slow: bool, tmp_path: Path) -> None:
+def test_a_fuzzed_rig_is_read_or_refused_with_its_position(slow: bool, tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
 
     def read(data: bytes) -> None:
@@ -130,7 +130,7 @@ def test_any_rig_is_read_or_refused_with_the_place(slow: bool, tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_any_table_is_read_or_refused_with_the_place(slow: bool, tmp_path: Path) -> None:
+def test_a_fuzzed_table_is_read_or_refused_with_its_position(slow: bool, tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
 
     def read(data: bytes) -> None:
@@ -149,7 +149,9 @@ def test_any_table_is_read_or_refused_with_the_place(slow: bool, tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_any_curet_tables_are_read_or_refused_with_the_place(slow: bool, tmp_path: Path) -> None:
+def test_fuzzed_curet_tables_are_read_or_refused_with_their_position(
+    slow: bool, tmp_path: Path
+) -> None:
     paths = tmp_path / "table.txt", tmp_path / "abrdf.dat"
     examples = TABLE.encode(), VALUES.encode()
     for path, text in zip(paths, examples, strict=True):

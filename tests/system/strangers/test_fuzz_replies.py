@@ -1,12 +1,12 @@
-"""Controllers that answer anything: the driver's result is true, or an error with a name.
+"""Fuzzed replies of controllers: a driver returns the true position or raises a `DeviceError`.
 
-Real drivers over emulated controllers, on a wire of memory that spoils some of the answers. What
-is promised of a damaged answer depends on what protects it:
+Real drivers talk to emulated controllers over an in-memory line that damages some of the replies.
+The guarantee for a damaged reply depends on its error detection:
 
-- Modbus RTU: 16 bits of CRC. No wrong position is ever taken for the truth here.
-- Zaber: 8 bits of checksum. Any one wrong byte is found; of larger damages one in 256 may pass.
-- Newport: none. What is taken is a finite number in an answer to that very question.
-- Modbus TCP: TCP's own. A gateway may mix up answers: number, unit and length tell them apart.
+- Modbus RTU: a CRC of 16 bits. No wrong position is accepted here.
+- Zaber: a checksum of 8 bits. Any single wrong byte is detected; of larger damage 1 in 256 passes.
+- Newport: none. A finite number in a reply to the same command is accepted.
+- Modbus TCP: that of TCP. A gateway may mix up replies: transaction, unit and length are checked.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ ACTIONS = (status, move, home, open_again)
 
 @dataclass
 class Session:
-    """A stage that has been homed, and what its wire makes of the answers."""
+    """A homed stage, and the damage that its line does to replies."""
 
     kind: str
     memory: MemoryStage
@@ -66,7 +66,7 @@ class Session:
 
     @classmethod
     def of(cls, kind: str, patch: pytest.MonkeyPatch, seed: int = 1) -> Session:
-        """A session whose genuine answers, of every question once, are the mutator's examples."""
+        """Return a session whose mutator knows one genuine reply to each command."""
         # pytest would keep all that is logged.
         patch.setattr(logging.getLogger("pymodbus.logging"), "disabled", True)
         memory = in_memory(kind, patch)
@@ -78,7 +78,7 @@ class Session:
         return cls(kind, memory, Mutator(examples, seed).spoil, stage)
 
     def take(self, number: int) -> None:
-        """One action with some answers spoilt; then, with none, the truth."""
+        """Do one action with damaged replies, then read the position over a sound line."""
         rng = random.Random(number)
         memory, action = self.memory, rng.choice(ACTIONS)
         memory.wire.heard.clear()
@@ -93,7 +93,7 @@ class Session:
         except BaseException as error:
             error.add_note(f"{action.__name__}, heard {bytes(memory.wire.heard[-2000:])!r}")
             raise
-        assert said.isprintable(), "a message that a terminal could stumble over"
+        assert said.isprintable(), "a message that is not safe for a terminal"
         assert memory.clock.now_s() - began_s < ONCE_MORE_S
         assert memory.moves() - moves <= (2 if self.kind == "oriental tcp" else 1)
         self._heal()
@@ -110,7 +110,7 @@ class Session:
         return abs(said_deg - self.memory.motor.position_deg) < 2 / STEPS_PER_DEG
 
     def _newport_numbers(self) -> set[float | None]:
-        """What whole answers to TP have said."""
+        """Return the numbers in complete replies to TP."""
         lines = bytes(self.memory.wire.heard).replace(b"\0", b"").split(b"\n")
         answers = [line.strip(b"\r")[3:] for line in lines if line.startswith(b"1TP")]
         return {number_of(text.decode("latin-1").strip()) for text in answers}
@@ -118,15 +118,15 @@ class Session:
     def _heal(self) -> None:
         self.memory.wire.spoil = lambda answer: answer
         self.memory.clock.readings = 0
-        self.memory.clock.sleep(1.0)  # whatever it was told to do has ended
-        assert self.is_true(self.stage.status().position_deg), "wrong on a sound line"
+        self.memory.clock.sleep(1.0)  # any motion has ended
+        assert self.is_true(self.stage.status().position_deg), "wrong over an undamaged line"
         if not self.memory.motor.referenced:
             self.stage.home()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_whatever_comes_the_driver_says_the_truth_or_what_failed(
+def test_damaged_replies_give_the_true_position_or_an_error(
     kind: str, slow: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session, count = Session.of(kind, monkeypatch), 10_000 if slow else 120
@@ -136,7 +136,7 @@ def test_whatever_comes_the_driver_says_the_truth_or_what_failed(
 
 
 def _signed(kind: str, answer: bytes) -> bytes:
-    """A frame about whatever stands in the answer, with the check of its protocol."""
+    """Return the contents of a reply in a frame with a valid checksum."""
     if kind == "zaber":
         body = answer.partition(b":")[0].lstrip(b"@")
         return b"@%b:%02X\r\n" % (body, -sum(body) & 0xFF)
@@ -149,14 +149,14 @@ def _signed(kind: str, answer: bytes) -> bytes:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_controller_that_lies_in_due_form_gives_a_result_or_an_error(
+def test_wrong_replies_with_a_valid_checksum_give_a_result_or_an_error(
     kind: str, slow: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its frames are sound, what they say is not: no check can find a lie, but nothing breaks."""
+    """No check can detect them, but nothing else breaks."""
     session = Session.of(kind, monkeypatch, seed=2)
     damaged = session.spoil
     session.spoil = lambda rng, answer: _signed(kind, damaged(rng, answer))
-    session.kind = "oriental tcp"  # a lie may be taken, and a lie about a target be answered
+    session.kind = "oriental tcp"  # a wrong value may be accepted, and a wrong target be answered
     feed(
         lambda number: str(number).encode(),
         10_000 if slow else 100,
@@ -166,10 +166,10 @@ def test_a_controller_that_lies_in_due_form_gives_a_result_or_an_error(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["zaber", "oriental rtu"])
-def test_one_wrong_byte_in_a_position_is_never_taken(
+def test_one_wrong_byte_in_a_position_is_never_accepted(
     kind: str, slow: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Both checks find every error within one byte; here the driver does, at every place."""
+    """Both checksums detect every error within one byte, at every position of the frame."""
     session = Session.of(kind, monkeypatch)
     length = len(session.memory.wire.genuine[-1])
     masks = range(1, 256) if slow else (16,)
@@ -188,8 +188,8 @@ def test_one_wrong_byte_in_a_position_is_never_taken(
         assert session.is_true(taken), (at, mask)
 
 
-def test_a_gateway_that_mixes_up_answers_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whole answers to other questions, other units, other transactions, and parts of them."""
+def test_mixed_up_replies_of_a_gateway_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Complete replies to other requests, units and transactions, and parts of them."""
     session = Session.of("oriental tcp", monkeypatch)
     earlier = list(session.memory.wire.genuine)
 
@@ -221,7 +221,7 @@ FRAMED = 100_000
 
 @pytest.mark.slow
 def test_newport_framing_reads_any_line(slow: bool) -> None:
-    """None, `Garbled`, or what stands in it: printable text, a finite number, a known state."""
+    """Returns None, printable text, a finite number or a known state, or raises `Garbled`."""
 
     def read(line: bytes) -> None:
         for letters in ("TP", "TS", "VE"):
@@ -258,7 +258,7 @@ def _state(state: object) -> None:
 
 @pytest.mark.slow
 def test_zaber_framing_reads_any_line(slow: bool) -> None:
-    """Whatever is taken for a reply has its checksum, and nothing but printable characters."""
+    """An accepted reply has a valid checksum and only printable characters."""
 
     def read(line: bytes) -> None:
         for one in (line, _signed("zaber", line).rstrip(b"\r\n")):
@@ -275,7 +275,7 @@ def test_zaber_framing_reads_any_line(slow: bool) -> None:
 
 @pytest.mark.slow
 def test_oriental_framing_reads_any_registers(slow: bool) -> None:
-    """Registers hold any 16 bits: they are told apart from an AZ drive's, or read as such."""
+    """Registers of any 16 bits are recognised as not of an AZ drive, or read as such."""
 
     def read(data: bytes) -> None:
         words = [data[i] << 8 | data[i + 1] for i in range(0, 40, 2)]
@@ -295,8 +295,8 @@ def test_oriental_framing_reads_any_registers(slow: bool) -> None:
 
 
 @pytest.mark.slow
-def test_whatever_the_modbus_framer_takes_has_its_crc(slow: bool) -> None:
-    """pymodbus takes frames apart, and finds one behind noise: the driver relies on its CRC."""
+def test_a_frame_that_the_modbus_framer_accepts_has_a_valid_crc(slow: bool) -> None:
+    """pymodbus parses frames and finds one after noise: the driver relies on its CRC check."""
     framer = FramerRTU(DecodePDU(False))
     frames = [bytes.fromhex(text) for text in (
         "010304FFFFFF9C", "0103080000403000000000", "0106007D0020", "011000580010", "018302",
@@ -307,7 +307,7 @@ def test_whatever_the_modbus_framer_takes_has_its_crc(slow: bool) -> None:
             try:
                 _, pdu = framer.handleFrame(frame, 1, 0)
             except (ModbusException, ValueError, IndexError):
-                continue  # the bus makes `Garbled` of it
+                continue  # the bus raises `Garbled` for it
             if pdu is not None:
                 assert any(
                     crc(frame[first:last]) == frame[last : last + 2]

@@ -1,4 +1,4 @@
-"""Run folders from strangers: a record runs nothing, breaks nothing and changes no other file."""
+"""Run folders from elsewhere: a record runs no code, breaks nothing, and changes no other file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.support.strangers.run_folders import REFUSED, SCRIPT, Sent, copy_of, 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A sound run: the demo with few view angles."""
+    """A valid run: the demo with few view angles."""
     return run_few_points(tmp_path_factory.mktemp("run"))
 
 
@@ -35,10 +35,10 @@ WAYS: dict[str, Callable[[Path], object]] = {
 
 @pytest.mark.parametrize("version", [4, 3])
 @pytest.mark.parametrize("what", REFUSED)
-def test_a_record_that_no_scan_can_have_written_is_refused(
+def test_every_command_refuses_a_record_that_no_scan_wrote(
     run: Path, tmp_path: Path, what: str, version: int
 ) -> None:
-    """By every command, before anything is done with it, and no other file is touched."""
+    """Before it does anything else; no other file is changed."""
     sent = copy_of(run, tmp_path, version)
     change, words = REFUSED[what]
     change(sent)
@@ -53,7 +53,7 @@ def test_a_record_that_no_scan_can_have_written_is_refused(
 
 
 def _others(sent: Sent) -> dict[str, bytes]:
-    """Everything but the database, which SQLite may recover."""
+    """Return all files except the database, which SQLite may recover."""
     return {
         path.name: path.read_bytes()
         for path in sent.folder.parent.rglob("*")
@@ -61,7 +61,7 @@ def _others(sent: Sent) -> dict[str, bytes]:
     }
 
 
-def test_the_command_refuses_a_stranger_s_record(sent: Sent) -> None:
+def test_the_exit_code_for_a_refused_record_is_2(sent: Sent) -> None:
     change, words = REFUSED["a view without end in place of meta"]
     change(sent)
     done = gonio("resume", sent.folder, "--yes")
@@ -70,8 +70,8 @@ def test_the_command_refuses_a_stranger_s_record(sent: Sent) -> None:
     assert "Traceback" not in done.stderr
 
 
-def test_what_cannot_harm_is_shown_as_it_is(sent: Sent) -> None:
-    """HTML in captions, pictures and devices; a count of steps that lies; a log left over."""
+def test_harmless_contents_are_shown_as_text(sent: Sent) -> None:
+    """HTML in captions, pictures and devices; a wrong count of steps; a leftover log."""
     sent.sql(
         f"UPDATE preview SET caption = '{SCRIPT}', png = CAST('{SCRIPT}' AS BLOB)",
         f"UPDATE device SET identity = '{SCRIPT}'",
@@ -107,13 +107,14 @@ def _outcome(way: Callable[[Path], object], folder: Path) -> str:
 @pytest.mark.parametrize(
     "change", ["u_noise_dn = 0.0", "signal_dn = 1e30", "signal_dn = -1e-30", "time_s = -step"]
 )
-def test_values_that_are_no_measurement_end_with_a_name(sent: Sent, change: str) -> None:
-    """In due form, but impossible: whatever comes of it is a result or an error with a name."""
+def test_impossible_but_well_formed_values_give_a_result_or_a_named_error(
+    sent: Sent, change: str
+) -> None:
     sent.forge(f"UPDATE reading SET {change}")
     assert _outcome(WAYS["fit"], sent.folder) in ("a result", "NotDetermined")
 
 
-def test_a_report_of_values_that_are_no_measurement(sent: Sent) -> None:
+def test_a_report_of_impossible_values_says_that_nothing_was_fitted(sent: Sent) -> None:
     sent.sql("UPDATE reading SET u_noise_dn = 0.0, u_quantisation_dn = 0.0, u_texture_dn = 0.0")
     report_run(sent.folder, as_json=True)
     assert "No model was fitted" in (sent.folder / "report.html").read_text()

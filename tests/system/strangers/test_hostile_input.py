@@ -1,4 +1,4 @@
-"""What strangers send is data: files, names and replies are read and shown, and never obeyed."""
+"""Hostile files, names and replies are data: they are read and shown, never executed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TEXT = PROTOCOL.replace("rig: rig.yaml\n", "description: none\nrig: rig.yaml\n")
 
 
 def protocol(folder: Path, old: str, new: str) -> Loaded:
-    """The tests' own protocol with one thing changed, read with its rig beside it."""
+    """Load the small protocol with one text replaced, and its rig."""
     assert TEXT.count(old) == 1
     (folder / "p.yaml").write_text(TEXT.replace(old, new))
     (folder / "rig.yaml").write_text(RIG)
@@ -57,7 +57,7 @@ def refusal(folder: Path, old: str, new: str) -> str:
         "!mine {a: 1}",
     ],
 )
-def test_a_tag_makes_nothing_but_a_mistake(
+def test_a_yaml_tag_is_a_mistake_and_runs_nothing(
     value: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -80,8 +80,8 @@ BOMBS = {
 
 
 @pytest.mark.parametrize("name", BOMBS)
-def test_aliases_are_never_laid_out(name: str, tmp_path: Path) -> None:
-    """In less time than laying out even the 40th level would take, and the first place is told."""
+def test_yaml_aliases_are_never_expanded(name: str, tmp_path: Path) -> None:
+    """In less time than the expansion of the 40th level would take, and with its position."""
     path, rig = tmp_path / "p.yaml", tmp_path / "rig.yaml"
     path.write_text(BOMBS[name])
     rig.write_text(RIG)
@@ -94,8 +94,8 @@ def test_aliases_are_never_laid_out(name: str, tmp_path: Path) -> None:
     assert len(str(refused.value)) < 60_000
 
 
-def test_many_refused_values_take_no_longer_than_each_alone(tmp_path: Path) -> None:
-    """Time goes with the number of aliases: ten times as many must not take a hundred times."""
+def test_the_time_for_refused_values_is_linear(tmp_path: Path) -> None:
+    """Ten times as many aliases must not take a hundred times as long."""
     (tmp_path / "rig.yaml").write_text(RIG)
 
     def took_s(count: int) -> float:
@@ -114,8 +114,8 @@ def test_many_refused_values_take_no_longer_than_each_alone(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("rig", ["/dev/zero", "/dev/stdin", "/dev/tty", "pipe", "socket", "link"])
-def test_a_protocol_can_name_no_device_or_pipe_as_its_rig(rig: str, tmp_path: Path) -> None:
-    """Not even to be opened: reading some would wait for ever."""
+def test_a_device_or_a_pipe_is_refused_as_a_rig_file(rig: str, tmp_path: Path) -> None:
+    """It is not even opened: reading some would block for ever."""
     os.mkfifo(tmp_path / "pipe")
     os.mknod(tmp_path / "socket", 0o140600)
     (tmp_path / "link").symlink_to("/dev/zero")
@@ -126,8 +126,8 @@ def test_a_protocol_can_name_no_device_or_pipe_as_its_rig(rig: str, tmp_path: Pa
         load_protocol(tmp_path / "p2.yaml")
 
 
-def test_another_file_is_only_read_as_yaml_and_not_told(tmp_path: Path) -> None:
-    """Whatever file a protocol names as its rig, its contents do not come out in the message."""
+def test_a_message_about_another_file_does_not_show_its_contents(tmp_path: Path) -> None:
+    """A protocol may name any file as its rig, such as a list of passwords."""
     lines = [f"user{n}:x:{n}:{n}:secret number {n}:/home/user{n}:/bin/sh" for n in range(500)]
     (tmp_path / "passwd").write_text("\n".join(lines))
     inner = tmp_path / "a" / "b"
@@ -155,7 +155,7 @@ def test_a_large_file_is_refused_without_being_read_whole(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("escape", ["\\e[2J", "\\x07", "\\r", "\\0", "\\x9b", "\\u202e", "\\L"])
-def test_a_name_holds_no_command_to_a_terminal(escape: str, tmp_path: Path) -> None:
+def test_a_name_with_a_control_character_is_refused(escape: str, tmp_path: Path) -> None:
     said = refusal(tmp_path, "description: none", f'description: "a{escape}b"')
     assert "holds a control character" in said
     assert first_unfit(said) is None
@@ -164,22 +164,22 @@ def test_a_name_holds_no_command_to_a_terminal(escape: str, tmp_path: Path) -> N
 
 
 def test_a_name_has_one_line(tmp_path: Path) -> None:
-    """A second line of a name could pass for a prompt of the program's own."""
+    """A second line could look like a prompt of the program itself."""
     said = refusal(tmp_path, "name: foam\n", 'name: "a\\nGo on? y"\n')
     assert "name: 'a\\nGo on? y' has more than one line" in said
     described = protocol(tmp_path, "description: none", 'description: "one\\ntwo"')
     assert described.protocol.description == "one\ntwo"
 
 
-def test_a_name_leads_to_no_other_folder(tmp_path: Path) -> None:
-    """A run's folder is called after the protocol's file, whatever stands in it."""
+def test_a_name_does_not_change_the_folder_of_the_run(tmp_path: Path) -> None:
+    """The folder is named after the protocol's file, not after the name in it."""
     loaded = protocol(tmp_path, "name: foam\n", "name: ../../../x/\n")
     folder = default_folder(loaded)
     assert folder.parent == Path("runs")
     assert folder.name.startswith("p-")
 
 
-def test_names_are_shown_as_they_stand_on_the_terminal() -> None:
+def test_the_terminal_shows_control_characters_and_markup_as_text() -> None:
     shown = io.StringIO()
     EscapingConsole(file=shown, markup=False, emoji=False, force_terminal=True, width=200).print(
         HARMFUL, highlight=False
@@ -191,7 +191,7 @@ def test_names_are_shown_as_they_stand_on_the_terminal() -> None:
     assert first_unfit(text) is None
 
 
-def test_names_are_escaped_in_the_report() -> None:
+def test_the_report_escapes_html_in_names() -> None:
     import numpy as np
 
     bad = '</title><script>alert(1)</script>"><img src=x onerror=alert(1)>'
@@ -209,10 +209,10 @@ def test_names_are_escaped_in_the_report() -> None:
     assert page.count("&lt;script&gt;") >= 12
 
 
-def test_a_zaber_that_sends_commands_to_the_terminal_is_not_repeated(
+def test_a_message_about_a_zaber_reply_has_no_control_characters(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Its checksum is right: what it says is still shown to nobody, and is no answer."""
+    """The reply has a valid checksum; it is refused all the same, and not shown."""
     memory = in_memory("zaber", monkeypatch)
 
     def coloured(answer: bytes) -> bytes:
@@ -238,7 +238,7 @@ def test_a_line_of_50_mb_and_a_million_columns_are_refused(tmp_path: Path) -> No
         read_csv(path)
 
 
-def test_a_table_that_is_all_wrong_is_not_read_to_its_end(tmp_path: Path) -> None:
+def test_reading_of_a_table_stops_after_many_mistakes(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_bytes(BARE.encode() + b"xy\n" * 100_000)
     with pytest.raises(InputError) as refused:
