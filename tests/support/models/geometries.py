@@ -27,10 +27,16 @@ def special_directions(count: int, limit_deg: float = 85.0) -> Geometry:
     return Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
 
 
-def exchanged(geometry: Geometry) -> Geometry:
-    """The geometry with lamp and camera exchanged, for tests of reciprocity."""
+def exchanged(geometry: Geometry, *, same_dphi: bool = False) -> Geometry:
+    """The geometry with lamp and camera exchanged, for tests of reciprocity.
+
+    dphi changes its sign; `same_dphi` keeps it, so that its rounding is the same, for surfaces that
+    are symmetric about the plane of incidence.
+    """
     return Geometry.from_degrees(
-        theta_i=geometry.theta_r_deg, theta_r=geometry.theta_i_deg, dphi=-geometry.dphi_deg
+        theta_i=geometry.theta_r_deg,
+        theta_r=geometry.theta_i_deg,
+        dphi=geometry.dphi_deg if same_dphi else -geometry.dphi_deg,
     )
 
 
