@@ -167,6 +167,7 @@ def _u_placement(
         window.mean(frames[0].image[crop] - dark.mean[crop])
         for crop in (behind, window.crop, ahead)
     )
+    # A normal displacement x of standard uncertainty u has rms(x^2) = sqrt(3) u^2.
     return -part * (after - before) / 2, part**2 * np.sqrt(3) * abs(after + before - 2 * here) / 2
 
 

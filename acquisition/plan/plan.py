@@ -225,10 +225,11 @@ def _hidden_references(steps: Sequence[Step], limit_deg: float, loaded: Loaded) 
 def _schedule(steps: Sequence[Step], hidden: tuple[Pose, ...], loaded: Loaded) -> Plan:
     """Return the plan, with the start and duration of every step predicted."""
     rig = loaded.rig
-    by_hand = rig.lamp.darkened_by == "hand"
-    darks_s = exposure_ladder_s(rig.camera) if by_hand else ()
-    time_s = _homing_s(rig) + (_darks_s(darks_s, rig.lamp.cover_s, loaded) if by_hand else 0.0)
-    swaps, taken_s, scheduled = 0, set(darks_s), []
+    time_s, darks_first_s = _homing_s(rig), tuple[float, ...]()
+    if rig.lamp.darkened_by == "hand":
+        darks_first_s = exposure_ladder_s(rig.camera)
+        time_s += _darks_s(darks_first_s, rig.lamp.cover_s, loaded)
+    swaps, taken_s, scheduled = 0, set(darks_first_s), []
     surface: Surface | None = None
     for step in steps:
         duration_s = sum(move.duration_s for move in step.moves)
@@ -244,7 +245,7 @@ def _schedule(steps: Sequence[Step], hidden: tuple[Pose, ...], loaded: Loaded) -
     return Plan(
         steps=tuple(scheduled),
         hidden=hidden,
-        darks_first_s=darks_s,
+        darks_first_s=darks_first_s,
         duration_s=time_s,
         swaps=swaps,
         hand_settings=hands,
@@ -252,7 +253,7 @@ def _schedule(steps: Sequence[Step], hidden: tuple[Pose, ...], loaded: Loaded) -
 
 
 def _darks_s(exposures_s: Sequence[float], cover_s: float, loaded: Loaded) -> float:
-    """Return the time to darken the lamp, take the darks of these exposures and light it again."""
+    """Return the duration of darkening, the darks of these exposures, and lighting again."""
     frames = loaded.protocol.dark_frames
     return 2 * cover_s + sum(_frames_s(frames, e, loaded.rig) for e in exposures_s)
 
