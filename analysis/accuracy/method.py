@@ -78,16 +78,14 @@ class MethodFamily:
     """All methods of computing one model.
 
     parameters: of all the kernels, with their domains. methods: in no order; the last one is the
-    most accurate. accuracy: of a geometry vector (N,), the relative error of the last one.
-    sampling: the values of a parameter's range at which errors are looked for: "ends" where errors
-    are monotone between them, "high" where its upper end has the largest, "even" or "log" steps
-    otherwise. floor: in 1/sr.
+    most accurate. sampling: the values of a parameter's range at which errors are looked for:
+    "ends" where errors are monotone between them, "high" where its upper end has the largest,
+    "even" or "log" steps otherwise. floor: in 1/sr.
     """
 
     name: str
     parameters: tuple[Parameter, ...]
     methods: tuple[Method, ...]
-    accuracy: Callable[[Geometry], FloatArray]
     sampling: Mapping[str, Sampling]
     floor: float = 0.0
 
@@ -103,6 +101,10 @@ class MethodFamily:
     def reference(self) -> Method:
         """The most accurate method."""
         return self.methods[-1]
+
+    def accuracy(self, geometry: Geometry) -> FloatArray:
+        """Relative error of the most accurate method itself, (N,), at any parameters."""
+        return self.reference.bound(geometry, {})
 
     def relative_error(self, found: FloatArray, reference: FloatArray) -> FloatArray:
         """Signed error relative to the reference or the floor; 0 where both are 0.

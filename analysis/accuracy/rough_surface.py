@@ -43,7 +43,7 @@ def _lambert(geometry: Geometry, albedo: float, sigma_deg: float) -> FloatArray:
     return lambert_brdf(geometry, albedo)
 
 
-def _fine_error(geometry: Geometry) -> FloatArray:
+def _fine_error(geometry: Geometry, _: Ranges) -> FloatArray:
     larger = np.maximum(geometry.theta_i_deg, geometry.theta_r_deg)
     return np.where(larger > FINE_LIMIT_DEG, 2e-4, 1e-8)
 
@@ -70,13 +70,7 @@ ROUGH_SURFACE = MethodFamily(
             "coarse", _rule(COARSE), partial(map_bound, "coarse"), fixed_cost(30e3, 700, 1000, 5.3)
         ),
         Method("exact", _rule(RULE), _rule_error, fixed_cost(30e3, 1100, 1100, 6.3)),
-        Method(
-            "fine",
-            _rule(FINE),
-            lambda geometry, _: _fine_error(geometry),
-            fixed_cost(30e3, 3500, 1300, 10),
-        ),
+        Method("fine", _rule(FINE), _fine_error, fixed_cost(30e3, 3500, 1300, 10)),
     ),
-    _fine_error,
     {"albedo": "ends", "sigma_deg": "even"},
 )

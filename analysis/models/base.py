@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import reduce, wraps
+from functools import partial, reduce, wraps
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
@@ -196,6 +196,9 @@ class Model:
         return {name: parameter.check(given[name]) for name, parameter in known.items()}
 
 
+Terms = tuple[Model, ...]
+
+
 def add(*models: Model) -> Model:
     """Sum of models, named `a+b`: a parameter name that they share is one parameter of the sum.
 
@@ -206,37 +209,38 @@ def add(*models: Model) -> Model:
     for parameter in (p for model in models for p in model.parameters):
         known = shared.get(parameter.name)
         shared[parameter.name] = _intersection(known, parameter) if known else parameter
-    terms = [(m.kernel, tuple(p.name for p in m.parameters)) for m in models]
-
-    def kernel(geometry: Geometry, **parameters: float) -> FloatArray:
-        parts = (f(geometry, **{n: parameters[n] for n in names}) for f, names in terms)
-        return reduce(np.add, parts)
-
-    def own(model: Model, parameters: Mapping[str, float]) -> dict[str, float]:
-        return {p.name: parameters[p.name] for p in model.parameters}
-
-    def gradient(geometry: Geometry, **parameters: float) -> dict[str, FloatArray]:
-        total: dict[str, FloatArray] = {}
-        for model in models:
-            for name, by in model.gradient(geometry, **own(model, parameters)).items():
-                total[name] = total[name] + by if name in total else by
-        return total
-
-    def validity(geometry: Geometry, **parameters: float) -> Validity:
-        each = [model.validity(geometry, **own(model, parameters)) for model in models]
-        reasons = dict.fromkeys(v.reason for v in each if v.reason)
-        return Validity(np.all([v.mask for v in each], axis=0), "; ".join(reasons))
-
-    name = "+".join(m.name for m in models)
     return Model(
-        name,
+        "+".join(m.name for m in models),
         tuple(shared.values()),
-        kernel,
-        gradient,
-        validity,
+        partial(_sum_brdf, models),
+        partial(_sum_gradient, models),
+        partial(_sum_validity, models),
         in_blocks=all(model.in_blocks for model in models),
         terms=models,
     )
+
+
+def _sum_brdf(models: Terms, geometry: Geometry, **parameters: float) -> FloatArray:
+    return reduce(np.add, (m.kernel(geometry, **_own(m, parameters)) for m in models))
+
+
+def _sum_gradient(models: Terms, geometry: Geometry, **parameters: float) -> dict[str, FloatArray]:
+    total: dict[str, FloatArray] = {}
+    for model in models:
+        for name, by in model.gradient(geometry, **_own(model, parameters)).items():
+            total[name] = total[name] + by if name in total else by
+    return total
+
+
+def _sum_validity(models: Terms, geometry: Geometry, **parameters: float) -> Validity:
+    each = [model.validity(geometry, **_own(model, parameters)) for model in models]
+    reasons = dict.fromkeys(v.reason for v in each if v.reason)
+    return Validity(np.all([v.mask for v in each], axis=0), "; ".join(reasons))
+
+
+def _own(model: Model, parameters: Mapping[str, float]) -> dict[str, float]:
+    """Select the parameters of one model from those of the sum."""
+    return {p.name: parameters[p.name] for p in model.parameters}
 
 
 def _intersection(a: Parameter, b: Parameter) -> Parameter:

@@ -144,7 +144,6 @@ BECKMANN_LOBE = MethodFamily(
         *map(_truncated, TERMS),
         Method("adaptive", lobe_brdf, constant_bound(1e-9), _adaptive_cost),
     ),
-    lambda geometry: np.full(geometry.shape, 1e-9),
     {"scale": "high", "sigma_h": "log", "correlation_length": "log"},
     FLOOR,
 )

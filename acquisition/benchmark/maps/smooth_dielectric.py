@@ -90,6 +90,5 @@ SMOOTH_DIELECTRIC = MethodFamily(
         *map(_order, ORDERS),
         Method("exact", wolff_brdf, constant_bound(1e-10), fixed_cost(4500, 4)),
     ),
-    lambda geometry: np.full(geometry.shape, 1e-10),
     {"single_scattering_albedo": "even", "n": "even"},
 )
