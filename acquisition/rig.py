@@ -15,7 +15,7 @@ from acquisition.engine.axis import Axis
 from acquisition.engine.engine import Devices
 from drivers.manual import HandCoveredLamp, HandSetAxis
 from instrument.clock import Clock, SystemClock
-from instrument.closeable import Closing
+from instrument.closeable import Closeable
 from instrument.config.axes import AXES, HandAxis, SimulatedAxis, Wired
 from instrument.config.camera import V4l2CameraConfig
 from instrument.config.load import Loaded
@@ -81,7 +81,7 @@ def _scene(loaded: Loaded) -> Scene:
     return Scene.of(loaded.rig, loaded.protocol)
 
 
-class OpenRig(Closing):
+class OpenRig(Closeable):
     """Devices of a rig, each opened on request and closed at the end of a `with` block.
 
     `scene` is what a simulated or emulated rig shows; without one, a white sample.

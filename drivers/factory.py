@@ -13,7 +13,7 @@ from drivers.lines.serial_line import Line
 from drivers.stages.motion import Limits
 from drivers.stages.motor_stage import MotorStage
 from instrument.clock import Clock
-from instrument.closeable import Closing
+from instrument.closeable import Closeable
 from instrument.config.axes import NewportAxis, OrientalAxis, Wired, ZaberAxis
 from instrument.config.camera import V4l2CameraConfig
 from instrument.devices import Camera
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from drivers.lines.modbus_client import BusSettings
 
 
-class Lines(Closing):
+class Lines(Closeable):
     """The open ports, each opened once and shared; use it in a `with` statement."""
 
     def __init__(self, clock: Clock) -> None:

@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Self
 
 
-class Closing(ABC):
+class Closeable(ABC):
     """Resource with `close()`, usable as a context manager."""
 
     @abstractmethod

@@ -23,7 +23,7 @@ from drivers.lines.modbus_client import BusSettings, Client, client_for
 from drivers.lines.priority_lock import PriorityLock
 from drivers.lines.serial_line import Garbled, NoReply, PortGone
 from instrument.clock import Clock
-from instrument.closeable import Closing
+from instrument.closeable import Closeable
 from instrument.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ _EXCEPTIONS = {
 log = logging.getLogger(__name__)
 
 
-class ModbusBus(Closing):
+class ModbusBus(Closeable):
     """An open line: one exchange at a time, urgent ones first."""
 
     def __init__(self, who: str, settings: BusSettings, clock: Clock) -> None:

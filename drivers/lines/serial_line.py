@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from drivers.lines.priority_lock import PriorityLock
 from instrument.clock import Clock
-from instrument.closeable import Closing
+from instrument.closeable import Closeable
 from instrument.errors import DeviceError
 
 REPLY_S = 0.15  # controllers answer within 10 to 50 ms; a stop waits no longer than this, and a
@@ -45,7 +45,7 @@ def number_of(text: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-class Line(Closing):
+class Line(Closeable):
     """An open serial port. `who` names the device behind it in messages."""
 
     def __init__(

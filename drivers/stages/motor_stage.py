@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from drivers.stages.motion import STALLED_S, HomingMonitor, Limits, MoveMonitor, Status
 from drivers.stages.watchdog import SILENT_S, Watchdog
 from instrument.clock import Clock
-from instrument.closeable import Closing
+from instrument.closeable import Closeable
 from instrument.errors import DeviceError
 
 log = logging.getLogger(__name__)
@@ -36,7 +36,7 @@ class MotorStage(ABC):
     """True for controllers that refuse to search for a reference that they have."""
 
     def __init__(
-        self, name: str, limits: Limits, clock: Clock, line: Closing | None = None
+        self, name: str, limits: Limits, clock: Clock, line: Closeable | None = None
     ) -> None:
         self.name, self._limits, self._clock, self._line = name, limits, clock, line
         self._target_deg: float | None = None

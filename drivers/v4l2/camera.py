@@ -19,7 +19,7 @@ from drivers.v4l2.session import EXTRA_FRAMES, Session
 from drivers.v4l2.settings import V4l2Settings
 from drivers.v4l2.worker_thread import Heartbeat, Hung, WorkerThread
 from instrument.clock import Clock
-from instrument.closeable import Closing
+from instrument.closeable import Closeable
 from instrument.devices import Frame
 from instrument.errors import CameraLost, DeviceError
 
@@ -34,7 +34,7 @@ _REOPEN_S, _FIRST_PAUSE_S = 2.0, 0.1
 Result = TypeVar("Result")
 
 
-class V4l2Camera(Closing):
+class V4l2Camera(Closeable):
     """An open camera with verified settings; it starts at its shortest exposure.
 
     A `with` statement or `close()` closes it.

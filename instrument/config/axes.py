@@ -91,36 +91,36 @@ class SimulatedAxis(_MotorAxis):
     driver: Literal["simulated"]
 
 
-class NewportAxis(_MotorAxis):
-    """Motor on a Newport SMC100 or CONEX-CC; prefer a /dev/serial/by-id path as `port`."""
+class _WiredAxis(_MotorAxis):
+    """Motor whose controller is connected to a port."""
 
-    driver: Literal["newport"]
     port: Port
-    model: Literal["SMC100", "CONEX-CC"] = "SMC100"
-    address: Annotated[int, Field(ge=1, le=31)] = 1
 
     @property
     def place(self) -> str:
-        """Address of the device on the port, in words."""
-        return f"address {self.address}"
+        """Address of the motor on its port, which several may share."""
+        keys = ("address", "device", "axis", "unit")
+        return " ".join(f"{key} {getattr(self, key)}" for key in keys if hasattr(self, key))
 
 
-class ZaberAxis(_MotorAxis):
+class NewportAxis(_WiredAxis):
+    """Motor on a Newport SMC100 or CONEX-CC; prefer a /dev/serial/by-id path as `port`."""
+
+    driver: Literal["newport"]
+    model: Literal["SMC100", "CONEX-CC"] = "SMC100"
+    address: Annotated[int, Field(ge=1, le=31)] = 1
+
+
+class ZaberAxis(_WiredAxis):
     """Zaber stage; `microsteps_per_deg` is a constant of the stage (X-RSW60: 4266.667)."""
 
     driver: Literal["zaber"]
-    port: Port
     device: Annotated[int, Field(ge=1, le=99)] = 1
     axis: Annotated[int, Field(ge=1, le=9)] = 1
     microsteps_per_deg: Positive
 
-    @property
-    def place(self) -> str:
-        """Address of the device on the port, and its axis, in words."""
-        return f"device {self.device} axis {self.axis}"
 
-
-class OrientalAxis(_MotorAxis):
+class OrientalAxis(_WiredAxis):
     """Motor on an Oriental Motor AZ drive with Modbus.
 
     `port`: a /dev/serial/by-id path for RTU, or tcp://host:port of a gateway. `steps_per_deg`
@@ -128,16 +128,10 @@ class OrientalAxis(_MotorAxis):
     """
 
     driver: Literal["oriental"]
-    port: Port
     unit: Annotated[int, Field(ge=1, le=247)] = 1
     steps_per_deg: Positive
     baudrate: Annotated[int, Field(ge=9600, le=921600)] = 115200
     parity: Literal["E", "N", "O"] = "E"
-
-    @property
-    def place(self) -> str:
-        """Address of the device on the port, in words."""
-        return f"unit {self.unit}"
 
 
 Wired = NewportAxis | ZaberAxis | OrientalAxis

@@ -18,7 +18,7 @@ from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
-from instrument.closeable import Closing
+from instrument.closeable import Closeable
 from instrument.devices import Frame
 from instrument.errors import GonioError, InputError, StorageError
 from instrument.record.network_share import network_share
@@ -32,7 +32,7 @@ LOCK_NAME = ".scanning"
 _NOT_PERMITTED = ("SQLITE_READONLY", "SQLITE_PERM", "SQLITE_CANTOPEN")
 
 
-class Record(Closing):
+class Record(Closeable):
     """Open record; use it with `with`. Every `add_...` is on disk when it returns."""
 
     def __init__(self, connection: sqlite3.Connection, folder: Path) -> None:

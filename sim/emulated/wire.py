@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from instrument.closeable import Closing
+from instrument.closeable import Closeable
 
 FaultName = Literal["drop", "delay", "late", "garbage", "truncate", "nul", "lose request", "unplug"]
 
@@ -45,7 +45,7 @@ class Fault:
     seconds: float = 0.0
 
 
-class _Wire(Closing):
+class _Wire(Closeable):
     """Passes bytes to the controllers and their answers back; subclasses implement the port.
 
     `seen`: time (monotonic, in s) and bytes of each message received from the master.

@@ -10,7 +10,7 @@ from pathlib import Path
 from struct import Struct
 
 from drivers.v4l2 import ioctl
-from instrument.closeable import Closing
+from instrument.closeable import Closeable
 from sim.emulated.v4l2.device import EmulatedCamera, Refused
 from sim.emulated.v4l2.stream import Stream
 
@@ -23,7 +23,7 @@ _NEXT = 0x80000000
 _KIND_NUMBERS = {name: number for number, name in reversed(ioctl.KINDS.items())}
 
 
-class V4l2Server(Closing):
+class V4l2Server(Closeable):
     """Server of one emulated camera on a socket, for any number of open descriptors."""
 
     def __init__(self, camera: EmulatedCamera, path: Path) -> None:
