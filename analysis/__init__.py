@@ -1,1 +1,4 @@
-"""Reflectance models, fit, choice, uncertainty, charts and reports. Knows only `instrument`."""
+"""Reflectance models, fits, choice of a model, and reports; imports only `instrument`.
+
+Open `fit/fit.py` first, and `models/base.py` to add a model.
+"""

@@ -22,7 +22,7 @@ from tests.support.paths import ROOT
 GLOSS = "oren_nayar+torrance_sparrow"
 
 
-FEW = ("lambert", "oren_nayar", "lambert+torrance_sparrow", GLOSS)  # where no model fits any better
+FEW = ("lambert", "oren_nayar", "lambert+torrance_sparrow", GLOSS)  # no other model fits better
 
 
 def seeds(slow: bool) -> range:

@@ -28,7 +28,7 @@ def test_noise_is_rarely_taken_for_structure(incidences: int) -> None:
     for p in (0.05, 0.25, 0.5):
         assert np.mean(found < p) <= p + 3 * np.sqrt(p * (1 - p) / 300)
     assert np.mean(found < 0.05) <= 0.08
-    assert np.mean(found < 0.5) >= 0.3  # runs are whole numbers: rather too few
+    assert np.mean(found < 0.5) >= 0.3  # runs are whole numbers, so the test is conservative
     assert np.all(found >= 1e-4)
 
 
@@ -40,7 +40,7 @@ def test_a_smooth_misfit_is_improbable_and_an_alternating_one_is_not() -> None:
     assert runs_probability(m, 2 * waves + noise) < 1e-3
     assert runs_probability(m, (-1.0) ** np.arange(m.size)) > 0.999
     assert runs_probability(m, np.zeros(m.size)) == 1
-    assert runs_probability(m, np.ones(m.size)) == 1  # an offset is a matter of chi2
+    assert runs_probability(m, np.ones(m.size)) == 1  # an offset is left to chi2
 
 
 def test_runs_follow_the_angle_and_not_the_order_of_measurement() -> None:
@@ -88,7 +88,7 @@ def test_the_worst_stretch_comes_first_and_noise_is_not_reported() -> None:
     assert [s.theta_i_deg for s in worst_stretches(m, r)] == [60, 45]
     assert len(worst_stretches(m, r, most=1)) == 1
     calm = worst_stretches(m, 0.5 * (-1.0) ** np.arange(m.size))
-    assert len(calm) == 1  # the worst is named in any case
+    assert len(calm) == 1  # the worst is always reported
 
 
 def test_a_point_set_aside_does_not_split_a_stretch() -> None:

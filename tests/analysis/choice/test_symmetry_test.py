@@ -92,7 +92,7 @@ def test_the_asymmetry_is_the_difference_over_the_sum() -> None:
     assert found.pairs == 2
     assert found.asymmetry == pytest.approx((0.1 + 0.1) / (0.5 + 0.3))
     assert "2 pairs; lamp's side brighter by 50 %" in str(found)
-    far = replace(m, dphi_deg=np.full(4, 180.0))  # the same sweep, driven from the other side
+    far = replace(m, dphi_deg=np.full(4, 180.0))  # the same sweep, from the other side
     assert symmetry(far, lambda g: np.full(g.shape, 0.2), 0.0).asymmetry == -found.asymmetry
 
 

@@ -81,8 +81,8 @@ def test_a_small_rig_measures_the_plain_brdf() -> None:
         )
         found = averaged_brdf(rough, THETA_I, THETA_R, DPHI, small, 3)
         errors.append(np.max(np.abs(found / plain - 1)))
-    assert errors[0] > 1e-3  # it matters for the rig as it is
-    # At a kink (theta_i = theta_r) the change goes as the discs' radius: root of 10 each time.
+    assert errors[0] > 1e-3  # it matters for the full-size rig
+    # At a kink (theta_i = theta_r) the change is proportional to the radius: root of 10 each time.
     assert errors[1] < errors[0] / 2.5
     assert errors[2] < errors[1] / 2.5
 
@@ -117,7 +117,7 @@ def test_against_random_rays(n: int) -> None:
     mean, u = monte_carlo(THETA_I[n], THETA_R[n], DPHI[n], 200_000)
     found = averaged_brdf(rough, THETA_I[n], THETA_R[n], DPHI[n], RIG, 3)
     assert found == pytest.approx(mean, abs=4 * u)
-    assert u / mean < 3e-4  # the comparison says something
+    assert u / mean < 3e-4  # the comparison is precise enough
 
 
 def test_radiance_shapes_and_unit_irradiance() -> None:

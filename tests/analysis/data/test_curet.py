@@ -58,7 +58,7 @@ def test_values_left_out_are_counted_within_the_requested_directions() -> None:
     assert counts(read_curet(write(), 1)) == (3, 0, 1, 0, 4)
     assert counts(read_curet(write(), 1, 80.0)) == (3, 0, 0, 1, 4)
     assert counts(read_curet(write(), 2, 60.0)) == (1, 1, 0, 2, 4)
-    # A limit that the table can print only as 0.400000 rad leaves that direction in.
+    # A limit that rounds to 0.400000 rad, as printed in the table, includes that direction.
     assert counts(read_curet(write(), 1, float(np.degrees(0.4 - 5e-7)))) == (1, 0, 0, 3, 4)
 
 

@@ -24,8 +24,8 @@ def test_too_few_points() -> None:
     assert fit(MODELS["oren_nayar"], two).dof == 0
 
 
-# Samples as they occur. Lobes and spikes are no narrower than the scan can see: 2 degrees, at
-# views 5 degrees apart.
+# Realistic samples. Lobes and spikes are at least 2 degrees wide, which views 5 degrees apart can
+# resolve.
 RANGE = {
     "albedo": (0.1, 0.95), "sigma_deg": (5.0, 50.0), "ks": (0.02, 1.5),
     "lobe_sigma_deg": (2.0, 40.0), "f0": (0.02, 0.9), "alpha": (0.05, 0.8),

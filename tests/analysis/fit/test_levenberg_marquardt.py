@@ -16,9 +16,9 @@ from instrument.geometry import FloatArray
 
 T = np.linspace(0, 3, 25)
 NOISE = 0.02
-NEUTRAL = np.array([0.7, 0.3, 0.0, 0.0])  # of the parameters that a task leaves out
+NEUTRAL = np.array([0.7, 0.3, 0.0, 0.0])  # values of the parameters left out of a task
 SEEDS = range(60)
-# Where a bound lies below the truth, how far the other is above it, and where to start between.
+# Lower bound relative to the truth, width of the box, and start as a fraction of the width.
 BOX = st.tuples(st.floats(-1, 1), st.floats(0.05, 3), st.floats(0, 1))
 
 Curve = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
@@ -203,7 +203,7 @@ def test_a_start_on_the_bounds_is_left_where_chi2_falls_inwards() -> None:
         inside = problem.solve()
         corner = Task(problem.curve, problem.y, problem.high, problem.low, problem.high)
         found = corner.solve()
-        if found.chi2 < 1:  # from some corners another basin is reached
+        if found.chi2 < 1:  # some corners lead to another minimum
             assert found.x == pytest.approx(inside.x, rel=1e-6)
         assert found.chi2 <= corner.scipy(found.x) * (1 + 1e-6) + 1e-12
 

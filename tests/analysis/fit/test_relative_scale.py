@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from analysis.data.measurements import Measurements
-from analysis.fit.fit import fit
-from analysis.fit.relative_scale import FACTOR_NAME, normalise_lamp_levels, relative_model
+from analysis.fit.fit import FitResult, fit
+from analysis.fit.relative_scale import normalise_lamp_levels, relative_model
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
-from tests.support.analysis.seeded_scan import noise_free
+from tests.support.analysis.seeded_scan import noise_free, noisy_sweeps
 
+THETA_I, THETA_R = (
+    a.ravel()
+    for a in np.meshgrid([15.0, 30.0, 45.0, 60.0], np.arange(-75.0, 76.0, 5.0), indexing="ij")
+)
 TRUTH = {"albedo": 0.8, "sigma_deg": 30.0}
 MODEL = MODELS["oren_nayar_qualitative"]
 
@@ -22,15 +29,6 @@ def scaled(factor: float | FloatArray) -> Measurements:
     m = noise_free(MODEL.name, TRUTH)
     assert m.u_random is not None
     return replace(m, brdf=m.brdf * factor, u_random=m.u_random * factor, relative=True)
-
-
-@pytest.mark.parametrize("factor", [1e-3, 1e5])
-def test_the_roughness_is_found_in_any_unit_and_the_albedo_is_not(factor: float) -> None:
-    found = fit(MODEL, scaled(factor))
-    assert found.values["sigma_deg"] == pytest.approx(30.0, rel=1e-4)
-    assert found.u["sigma_deg"] is not None
-    assert found.u["albedo"] is None
-    assert {"albedo", FACTOR_NAME} <= set(found.undetermined)
 
 
 def test_lamp_levels_are_normalised_to_the_model() -> None:
@@ -49,3 +47,53 @@ def test_lamp_levels_are_normalised_to_the_model() -> None:
 def test_no_light_is_an_error() -> None:
     with pytest.raises(ValueError, match="mean of the relative values = 0"):
         relative_model(MODEL, np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("name", "truth"),
+    [
+        ("oren_nayar_qualitative", TRUTH),
+        ("oren_nayar", TRUTH),
+        ("oren_nayar_exact", TRUTH),
+        ("oren_nayar+torrance_sparrow", TRUTH | {"ks": 0.3}),
+    ],
+)
+def test_a_relative_scan_determines_the_roughness_and_no_scale(
+    name: str, truth: dict[str, float]
+) -> None:
+    m = noisy_sweeps(name, THETA_I, THETA_R, 3, **truth)
+    assert m.u_random is not None
+    counts = replace(m, brdf=5e3 * m.brdf, u_random=5e3 * m.u_random, relative=True)
+    found = fit(MODELS[name], counts)
+    scales = {"albedo", "ks", "per_brdf"} & set(found.values)
+    for scale in scales:
+        assert found.u[scale] is None
+        assert scale in found.undetermined
+    assert found.values["sigma_deg"] == pytest.approx(30.0, abs=4 * (found.u["sigma_deg"] or 0))
+    low, high = found.intervals["per_brdf"]
+    assert low <= 5e3 <= high
+    # The absolute scan determines the roughness at least as well.
+    absolute = fit(MODELS[name], m).u["sigma_deg"]
+    assert absolute is not None
+    assert absolute < 1.1 * (found.u["sigma_deg"] or np.inf)
+
+
+@cache
+def relative_scan() -> tuple[Measurements, FitResult]:
+    m = noisy_sweeps("oren_nayar", THETA_I, THETA_R, 3, **TRUTH)
+    return m, fit(MODELS["oren_nayar"], replace(m, relative=True))
+
+
+@given(exponent=st.floats(-9, 9))
+@settings(max_examples=8)
+def test_the_unit_of_a_relative_scan_has_no_effect(exponent: float) -> None:
+    m, one = relative_scan()
+    assert m.u_random is not None
+    factor = 10.0**exponent
+    scaled = replace(m, brdf=factor * m.brdf, u_random=factor * m.u_random, relative=True)
+    other = fit(MODELS["oren_nayar"], scaled)
+    assert other.chi2 == pytest.approx(one.chi2, rel=1e-6)
+    u = one.u["sigma_deg"]
+    assert u is not None
+    assert abs(other.values["sigma_deg"] - one.values["sigma_deg"]) < 1e-2 * u
+    assert other.u["sigma_deg"] == pytest.approx(u, rel=0.05)

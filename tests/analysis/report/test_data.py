@@ -17,7 +17,7 @@ class TestNoTile:
         model = replace(data_of().candidates[1], residuals=None)
         sweep = group_sweeps(replace(without_tile(), candidates=(model,)))[0]
         line = np.interp(sweep.theta_r_deg, sweep.line_deg, sweep.lines[0])
-        np.testing.assert_allclose(line, sweep.value, rtol=1e-12)  # the same shape, so the same
+        np.testing.assert_allclose(line, sweep.value, rtol=1e-12)  # of the same shape
 
 
 class TestSweeps:

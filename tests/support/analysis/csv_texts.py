@@ -31,3 +31,10 @@ def problems(content: str | bytes) -> tuple[str, ...]:
 def changed(text: str, old: str, new: str) -> str:
     assert text.count(old) == 1
     return text.replace(old, new)
+
+
+def assert_mistake(text: str, old: str, new: str, message: str) -> None:
+    """Replace a part of a table: the only problem begins with the message, nearly complete."""
+    (found,) = problems(changed(text, old, new))
+    assert found.startswith(f"data.csv:{message}")
+    assert len(found) - len(f"data.csv:{message}") < 30  # the rest is covered by other tables

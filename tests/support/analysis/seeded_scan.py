@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from analysis.data.acceptance import Acceptance, averaged_brdf
 from analysis.data.covariance import Covariance
@@ -89,3 +90,13 @@ def three_sweeps(order: FloatArray | None = None) -> Measurements:
     theta_i, theta_r, dphi = scan_angles()
     chosen = np.arange(theta_i.size) if order is None else np.argsort(order)
     return Measurements.bare(theta_i[chosen], theta_r[chosen], dphi[chosen], 0.2, 1e-3)
+
+
+def noisy_sweeps(
+    name: str, theta_i: ArrayLike, theta_r: ArrayLike, seed: int, **truth: float
+) -> Measurements:
+    """Values of a model in the plane of incidence, each with noise of 0.3 %."""
+    geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r)
+    f = MODELS[name].brdf(geometry, **truth)
+    noise = np.random.default_rng(seed).normal(size=f.size)
+    return Measurements.bare(theta_i, theta_r, 0.0, f * (1 + 0.003 * noise), 0.003 * f)
