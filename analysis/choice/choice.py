@@ -90,7 +90,7 @@ def _chosen(tried: Candidates, acceptance: Acceptance | None) -> Choice:
     chosen = _simplest(converged, best, measurements)
     verdict, reason = _verdict(chosen, measurements)
     if chosen is not best:
-        reason += f"; {best.model} has the lowest BIC, but not enough to justify its complexity"
+        reason += f"; {best.model} has the lowest BIC, but improves too little to be preferred"
     if tried.left_out:
         reason += f"; left out for lack of points: {', '.join(tried.left_out)}"
     noise = max(chosen.rms_relative, LEAST_NOISE) * float(np.mean(measurements.brdf))

@@ -23,14 +23,8 @@ from instrument.geometry import FloatArray, Geometry
 from tests.support.cpu_time import cpu_seconds
 
 THETA_I = np.repeat([15.0, 30.0, 45.0, 60.0], 50)
-
-
 THETA_R = np.tile(np.linspace(-75, 75, 50), 4)
-
-
 GEOMETRY = Geometry.from_degrees(theta_i=THETA_I, theta_r=THETA_R)
-
-
 TRUTH = {"albedo": 0.8, "sigma_deg": 25.0}
 
 

@@ -20,8 +20,6 @@ from tests.support.analysis.seeded_scan import DIFFUSE, GLOSSY, RIG, scan, scan_
 from tests.support.paths import ROOT
 
 GLOSS = "oren_nayar+torrance_sparrow"
-
-
 FEW = ("lambert", "oren_nayar", "lambert+torrance_sparrow", GLOSS)  # no other model fits better
 
 

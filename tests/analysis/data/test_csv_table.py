@@ -255,18 +255,10 @@ def test_all_mistakes_are_reported_at_once_by_position() -> None:
 
 
 ANGLE = st.floats(0, 90)
-
-
 GEOMETRY = st.tuples(ANGLE, st.floats(-90, 90), st.floats(-720, 720))
-
-
 VALUES = st.tuples(st.floats(-1e15, 1e15), st.floats(1e-15, 1e15))
-
-
 # A field holds no line end; a line that begins with # is a comment.
 TEXT = st.text(st.characters(exclude_characters="\r\n", codec="utf-8"), max_size=8)
-
-
 FURTHER = TEXT.filter(lambda text: not text.lstrip("\ufeff").startswith("#"))
 
 

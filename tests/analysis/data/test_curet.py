@@ -17,8 +17,6 @@ from tests.support.analysis.curet_texts import TABLE, VALUES
 from tests.support.paths import ROOT
 
 PUBLISHED = ROOT.parent / "shared" / "data" / "curet"
-
-
 published = pytest.mark.skipif(
     not PUBLISHED.is_dir(), reason="the CUReT tables are not in ../shared/data/curet"
 )
@@ -73,7 +71,6 @@ def test_comments_blank_lines_and_crlf() -> None:
 
 
 THETA = "allowed: a number from 0 to 1.570796 rad"
-
 
 # Text to replace, replacement, and the whole message, with positions counted by hand.
 TABLE_MISTAKES = {

@@ -103,10 +103,7 @@ THETA_I, THETA_R = (
     for a in np.meshgrid([15.0, 30.0, 45.0, 60.0], np.arange(-75.0, 76.0, 3), indexing="ij")
 )
 
-
 TRUTH = {"albedo": 0.7, "sigma_deg": 25.0}
-
-
 NAME = "oren_nayar"
 
 

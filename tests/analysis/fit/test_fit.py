@@ -98,12 +98,10 @@ def test_stated_u_is_that_of_the_fit_and_empty_where_nothing_is_determined() -> 
 
 CURET = ROOT.parent / "shared" / "data" / "curet"
 
-
 COLUMNS = (
     *("lambert", "minnaert", "oren_nayar_qualitative", "oren_nayar", "oren_nayar_exact"),
     "oren_nayar+torrance_sparrow_lobe",
 )
-
 
 FIGURES = [
     (10, 68.8, (0.118, 0.117, 0.0527, 0.0188, 0.0213, 0.0184)),

@@ -27,17 +27,9 @@ from instrument.geometry import FloatArray, Geometry
 from tests.support.analysis.seeded_scan import RIG, noisy_sweeps, scan
 
 INCIDENCES = (15.0, 30.0, 45.0, 60.0)
-
-
 VIEWS = np.arange(-75.0, 76.0, 5.0)
-
-
 THETA_I = np.repeat(INCIDENCES, VIEWS.size)
-
-
 THETA_R = np.tile(VIEWS, len(INCIDENCES))
-
-
 GEOMETRY = Geometry.from_degrees(theta_i=THETA_I, theta_r=THETA_R)
 ROUGH = {"albedo": 0.8, "sigma_deg": 30.0}
 
@@ -47,7 +39,6 @@ TRUTHS: dict[str, dict[str, float]] = {
     "wolff": {"single_scattering_albedo": 0.9, "n": 1.5},
     "oren_nayar+torrance_sparrow": {"albedo": 0.75, "sigma_deg": 25.0, "ks": 0.1},
 }
-
 
 # Simpler model and its parameters; right model and its parameters.
 STEPS = [
@@ -60,7 +51,6 @@ STEPS = [
         {"albedo": 0.75, "sigma_deg": 25.0, "ks": 0.1},
     ),
 ]
-
 
 BOUNDED, FEW = 0.04, 0.01  # fractions of the scans and of the choices that `make test` runs
 
