@@ -21,7 +21,7 @@ from tests.support.models.method_scenes import FAMILIES, angles, drawn_ranges, w
 Random = np.random.Generator
 
 POINT = {"albedo": (0.8, 0.8), "sigma_deg": (20.0, 20.0)}
-# A method that costs more than this many times another is dearer.
+# A method counts as more expensive from this cost ratio on.
 DEARER = 1.2
 
 
@@ -63,7 +63,7 @@ def breaks(
     """
     tolerance -= 2 * float(np.max(family.accuracy(geometry)))
     count = 65 if sum(low < high for low, high in ranges.values()) == 1 else 33
-    if family.name == "rough":  # the albedo counts by its ends, the highest sigma first
+    if family.name == "rough":  # only the ends of the albedo matter; highest sigma first
         albedos = sorted(set(ranges["albedo"]))
         sigmas = np.linspace(*reversed(ranges["sigma_deg"]), 129)
         tried: Iterator[dict[str, float]] = (
@@ -75,7 +75,7 @@ def breaks(
 
 
 def _top(ranges: Ranges) -> Ranges:
-    """A lobe's scale counts by its upper end."""
+    """Only the upper end of a lobe's scale matters."""
     return {"scale": (ranges["scale"][1],) * 2} if "scale" in ranges else {}
 
 
@@ -127,8 +127,8 @@ def named(tolerance: float, uses: int = 1, **ranges: tuple[float, float]) -> Ade
     return cheapest(ROUGH_SURFACE, scan, {**POINT, **ranges}, tolerance, uses=uses)
 
 
-def test_a_scan_needs_no_more_than_its_tolerance() -> None:
-    """In words: 1 lamp, a scan of 60 degrees, sigma 20: the forms, the table, the integral."""
+def test_the_method_follows_from_the_tolerance() -> None:
+    """One lamp, views up to 60 degrees, sigma 20: by tolerance a form, the table, the integral."""
     assert named(0.5).method == "lambert"
     assert named(0.12).method == "qualitative"
     assert named(0.08).method == "functional"

@@ -16,7 +16,7 @@ Random = np.random.Generator
 
 FAMILIES = {f.name: f for f in (ROUGH_SURFACE, SMOOTH_DIELECTRIC, BECKMANN_LOBE)}
 
-SPANS: dict[str, tuple[float, float]] = {  # where geometric, the logarithm is drawn evenly
+SPANS: dict[str, tuple[float, float]] = {  # drawn uniformly in the logarithm
     "scale": (1e-3, 10.0),
     "sigma_h": (1e-2, 100.0),
     "correlation_length": (0.1, 1000.0),

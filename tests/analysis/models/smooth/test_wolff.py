@@ -61,7 +61,7 @@ def wolff_as_printed(i_deg: float, r_deg: float, rho: float, n: float) -> float:
 @pytest.mark.parametrize(("rho", "n"), [(0.5, 1.5), (0.95, 1.33), (1.0, 1.5), (1.0, 2.0)])
 def test_the_printed_formula_to_1e_7(rho: float, n: float) -> None:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", IntegrationWarning)  # it asks for more than is needed
+        warnings.simplefilter("ignore", IntegrationWarning)  # its target is tighter than needed
         for i, r in ((0.0, 0.0), (30.0, 70.0)):
             geometry = Geometry.from_degrees(theta_i=i, theta_r=r)
             found = MODELS["wolff"].brdf(geometry, single_scattering_albedo=rho, n=n)
@@ -120,7 +120,7 @@ def test_equation_7_with_the_polynomial(epsilon: float) -> None:
     found = wolff_brdf(geometry, 0.9, 1.5, epsilon)
     np.testing.assert_allclose(found[:3], (bare * share)[:3], rtol=1e-12)
     assert found[3] == pytest.approx(0, abs=1e-15)
-    if epsilon == 0.07:  # as `wolff_brdf` says
+    if epsilon == 0.07:  # as `wolff_brdf` states
         darker = found[:3] / wolff_brdf(geometry, 0.9, 1.5)[:3]
         np.testing.assert_allclose(darker, [0.95, 0.88, 0.65], atol=5e-3)
 
@@ -178,7 +178,7 @@ def test_validity_ends_where_a_bare_half_space_diverges() -> None:
 
 
 def test_it_has_a_value_at_every_index() -> None:
-    # One n in 150 has sqrt(n^2)/n above 1 by rounding, which is no cosine.
+    # One n in 150 has sqrt(n^2)/n above 1 by rounding, which cannot be a cosine.
     mirror = Geometry.from_degrees(theta_i=0, theta_r=0)
     upper = np.array([(n - 1) * (n + 1) + 1 for n in np.linspace(1, 3, 4001)])
     index = np.linspace(1, 3, 4001)[np.sqrt(upper) / np.linspace(1, 3, 4001) > 1]

@@ -53,7 +53,7 @@ def exact_sum(g: mp.mpf, q: mp.mpf) -> mp.mpf:
 
 
 def exact_sums(g: mp.mpf, q: mp.mpf, names: Sequence[str]) -> list[mp.mpf]:
-    """e^-g sum g^m/(m!) w(m) e^(-q/m), outwards from its largest term, until no term counts."""
+    """e^-g sum g^m/(m!) w(m) e^(-q/m), outwards from the largest term to negligible ones."""
 
     def rises(m: int) -> bool:  # from term m to term m + 1
         return bool(mp.log(g / (m + 1)) + q / m - q / (m + 1) > 0)
@@ -114,7 +114,7 @@ def test_the_sum_at_random_arguments(g: float, q: float) -> None:
 
 @pytest.mark.parametrize("g", [1e-8, 0.5, 30.0, 50.0, 1e3, 1e6])
 def test_the_mirror_direction_in_closed_form(g: float) -> None:
-    # q = 0: e^-g (Ei(g) - gamma - ln g), a reference that sums nothing
+    # q = 0: e^-g (Ei(g) - gamma - ln g), a reference without a sum
     with mp.workdps(50):
         expected = float(mp.exp(-g) * (mp.ei(g) - mp.euler - mp.log(g)))
     found = float(poisson_sum(np.array(g), np.array(0.0), WEIGHTS["of the lobe"]))

@@ -109,7 +109,7 @@ def test_the_peak_is_off_specular_for_a_moving_sensor_only() -> None:
     source = moving_source(scan(angles, 50.0), 0.0, 1.0, 15.0, 0.0, 1.0)
     assert angles[np.argmax(sensor)] > 55
     assert angles[np.argmax(source)] == pytest.approx(50, abs=0.05)
-    # symmetric about the mirror direction, as the paper says of (62)
+    # symmetric about the mirror direction, as the paper states for (62)
     left, right = (moving_source(scan(50.0 + d, 50.0), 0.3, 1.0, 15.0, 0.5, 2.0) for d in (-4, 4))
     K_dl_part = 0.3 * (math.cos(math.radians(46)) - math.cos(math.radians(54)))
     assert left - right == pytest.approx(K_dl_part, rel=1e-9)
