@@ -103,7 +103,7 @@ class MethodFamily:
         return self.methods[-1]
 
     def accuracy(self, geometry: Geometry) -> FloatArray:
-        """Relative error of the most accurate method itself, (N,), at any parameters."""
+        """Bound on the relative error (a ratio) of the most accurate method itself, (N,)."""
         return self.reference.bound(geometry, {})
 
     def relative_error(self, found: FloatArray, reference: FloatArray) -> FloatArray:

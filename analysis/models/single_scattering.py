@@ -28,12 +28,12 @@ ASYMMETRY = Parameter(
 def single_scattering_brdf(geometry: Geometry, scattering: float, asymmetry: float) -> FloatArray:
     """Lommel and Seeliger's BRDF: scattering p(gamma) / (4 pi (cos_i + cos_r)).
 
-    Arguments and result as in `Model.brdf`.
     p = (1 - g^2) / (1 + g^2 + 2 g cos(gamma))^(3/2) is Henyey and Greenstein's phase function of
     gamma, the angle between the directions to lamp and camera (the light turns by pi - gamma), and
-    g = `asymmetry`: below 0 backward, 0 isotropic, above 0 forward. The mean of p over
-    the sphere is 1. Never negative; reciprocal; half of Lambert's for g = 0 at normal incidence and
-    view. It grows without limit only where lamp and camera both graze the surface.
+    g = `asymmetry`: below 0 backward, 0 isotropic, above 0 forward. The mean of p over the sphere
+    is 1. Never negative; reciprocal; half of Lambert's for g = 0 at normal incidence and view. It
+    grows without limit only where lamp and camera both graze. Arguments and result as in
+    `Model.brdf`.
     """
     cos_sum, base = _denominators(geometry, asymmetry)
     phase = (1 - asymmetry**2) / (base * np.sqrt(base))

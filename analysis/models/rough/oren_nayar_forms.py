@@ -97,9 +97,9 @@ def oren_nayar_gradient(
 def roughness_terms(geometry: Geometry) -> FloatArray:
     """Factor of sigma^2 / (sigma^2 + 0.09) in (33): its terms of C2 and C3.
 
-    Dimensionless, of the geometry's shape:
     cos(dphi) C2 tan(beta) + (1 - |cos(dphi)|) C3 tan((alpha + beta)/2), where b = 2 beta/pi,
     C2 = 0.45 (sin(alpha) - [cos(dphi) < 0] b^3) and C3 = 0.125 (4 alpha beta / pi^2)^2.
+    Dimensionless, of the geometry's shape.
     """
     cos_dphi = geometry.cos_dphi
     alpha, beta = _larger_and_smaller(geometry)

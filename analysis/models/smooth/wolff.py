@@ -66,7 +66,6 @@ def wolff_brdf(
 ) -> FloatArray:
     """Wolff's BRDF: 1998, equations (7) and (8), over L_i cos(theta_i) d omega.
 
-    Arguments and result as in `Model.brdf`.
     varrho (1 - F(theta_i, n)) (1 - F(asin(sin(theta_r)/n), 1/n)) with varrho = varrho_1/(1 - K).
     rho is the fraction of the light that a scatterer inside does not absorb, n the index of the
     material. F and H exact; relative error below 1e-10. Never negative; the same at every
@@ -74,6 +73,7 @@ def wolff_brdf(
     (7), of theta_i and theta_r, are Wolff's polynomial (0.07 for most dielectrics; at n = 1.5
     that is 5 % darker at normal incidence, 12 % at 50/50 and 35 % at 70/70 degrees); varrho keeps
     the exact one. With an `order` every H, in K too, is Chandrasekhar's of that order.
+    Other arguments and the result as in `Model.brdf`.
 
     Not quite reciprocal, as K depends on theta_r alone (errata). Largest difference on exchange of
     lamp and camera, over all angles, at normal against grazing: for n = 1.5 it is 1.5 % at

@@ -142,9 +142,8 @@ def half_vector(geometry: Geometry) -> tuple[FloatArray, ...]:
 def off_mirror2(geometry: Geometry) -> FloatArray:
     """Squared length of the tangential part of the sum of the unit vectors to lamp and camera.
 
-    Dimensionless, of the geometry's shape.
     sin²θ_i + sin²θ_r + 2 sinθ_i sinθ_r cos dphi, as a sum of squares: nothing cancels near the
-    mirror direction.
+    mirror direction. Dimensionless, of the geometry's shape.
     """
     x, y = np.sin(geometry.theta_i), np.sin(geometry.theta_r)
     cos_half_dphi = np.cos(np.radians(geometry.dphi_deg) / 2)

@@ -36,11 +36,10 @@ def unified_brdf(
 ) -> FloatArray:
     """The three components as a BRDF: 1991, equation (61) over cosθ_i, made reciprocal.
 
-    Arguments and result as in `Model.brdf`.
     diffuse/π + lobe exp(-θ_a²/2σ²)/(cosθ_i cosθ_r) + spike exp(-δ²/2w²)/(2πw² √(cosθ_i cosθ_r)),
     δ the angle from the mirror direction. `diffuse` is an albedo, `spike` the reflectance of the
     remaining mirror, `lobe` the lobe's peak at normal incidence. Never negative. Without
-    attenuation it grows as 1/cosθ, as printed (footnote 8).
+    attenuation it grows as 1/cosθ, as printed (footnote 8). Arguments and result: `Model.brdf`.
     """
     cc = np.cos(geometry.theta_i) * np.cos(geometry.theta_r)
     with np.errstate(under="ignore"):
