@@ -13,6 +13,7 @@ from analysis.data.measurements import Measurements, SharedError
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
 from tests.support.analysis.seeded_scan import scan
+from tests.support.models.derivatives import central_difference
 
 
 def test_whitening_gives_the_chi2_of_the_full_matrix() -> None:
@@ -47,10 +48,11 @@ def test_shared_errors_stand_at_the_right_points_of_the_matrix() -> None:
 
     f = smooth(m.geometry)
     C = full_covariance(m, smooth).matrix()
-    step = 1e-4
-    up = smooth(Geometry.from_degrees(theta_i=m.theta_i_deg + step, theta_r=m.theta_r_deg))
-    down = smooth(Geometry.from_degrees(theta_i=m.theta_i_deg - step, theta_r=m.theta_r_deg))
-    gradient = (up - down) / (2 * step)
+    gradient = central_difference(
+        lambda x: smooth(Geometry.from_degrees(theta_i=m.theta_i_deg + x, theta_r=m.theta_r_deg)),
+        0.0,
+        1e-4,
+    )
     a, b, far = 3, 5, m.size - 1  # two points of one lamp setting, and one of another
     tile = 0.005**2
     assert C[a, far] == pytest.approx(tile * f[a] * f[far], rel=1e-9)
