@@ -18,9 +18,9 @@ from analysis.models.base import Ranges
 from analysis.models.error_maps import ABSOLUTE, RELATIVE, Levels, cell_at, maps
 from analysis.models.specular.beckmann_spizzichino import (
     CORRELATION_LENGTH,
-    FEW,
     SCALE,
     SIGMA_H,
+    TERMWISE_BELOW,
     largest_term,
     lobe_brdf,
     lobe_exponent,
@@ -114,7 +114,7 @@ def _adaptive_cost(geometry: Geometry, ranges: Ranges) -> Cost:
     height, length = (sum(ranges[name]) / 2 for name in ("sigma_h", "correlation_length"))
     some = next(iter(geometry.blocks(_COUNTED)), (None, geometry))[1]
     peak = largest_term(optical_roughness(some, height), lobe_exponent(some, length))
-    few = peak < FEW
+    few = peak < TERMWISE_BELOW
     most = float(np.max(peak, initial=0.0, where=few))
     terms = math.ceil(most + 9 * math.sqrt(most) + 12)
     share = float(np.mean(few)) if few.size else 1.0

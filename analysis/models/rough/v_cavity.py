@@ -56,8 +56,8 @@ def attenuation(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> 
     Angles in radians; all arguments broadcast.
     """
     sa, va = _to_lamp(towards, theta_a, phi_a), _to_camera(towards, theta_a, phi_a)
-    lit = _over(2 * np.cos(towards.theta_i) * np.cos(theta_a), sa)
-    seen = _over(2 * np.cos(towards.theta_r) * np.cos(theta_a), va)
+    lit = _quotient(2 * np.cos(towards.theta_i) * np.cos(theta_a), sa)
+    seen = _quotient(2 * np.cos(towards.theta_r) * np.cos(theta_a), va)
     return np.clip(np.minimum(lit, seen), 0.0, 1.0)
 
 
@@ -78,7 +78,7 @@ def masked_width(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) ->
     starts at it. 1 where the facet turns away.
     """
     va, va_other = (_to_camera(towards, theta_a, phi) for phi in (phi_a, phi_a + np.pi))
-    return np.where(va > 0, np.clip(-_over(va_other, va), 0.0, 1.0), 1.0)
+    return np.where(va > 0, np.clip(-_quotient(va_other, va), 0.0, 1.0), 1.0)
 
 
 def shadowed_width(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) -> FloatArray:
@@ -88,7 +88,7 @@ def shadowed_width(towards: Directions, theta_a: FloatArray, phi_a: FloatArray) 
     facet turns away from the lamp.
     """
     sa, sa_other = (_to_lamp(towards, theta_a, phi) for phi in (phi_a, phi_a + np.pi))
-    return np.where(sa_other > 0, np.clip(-_over(sa, sa_other), 0.0, 1.0), 1.0)
+    return np.where(sa_other > 0, np.clip(-_quotient(sa, sa_other), 0.0, 1.0), 1.0)
 
 
 def interreflection_factor(
@@ -188,7 +188,7 @@ def _cosine(
     )
 
 
-def _over(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
+def _quotient(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
     """Quotient; +-infinity for division by zero, without a warning."""
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         return np.asarray(numerator / denominator)

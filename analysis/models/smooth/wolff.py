@@ -42,7 +42,7 @@ N = Parameter("n", "1", 1.0, 3.0, 1.5, starts=(1.2, 1.5, 2.2))
 _BEND_INSIDE = 1.00001
 # Up to so many distinct cosines, direct evaluation is cheaper than making a series; larger arrays
 # than the second number are not searched for distinct cosines.
-_FEW_COSINES, _SEARCHED = 64, 2048
+_FEW_COSINES, _MOST_SEARCHED = 64, 2048
 
 _NO_INTERFACE = f"n = 1: {GRAZING}"
 
@@ -188,7 +188,7 @@ def _h_and_k_gradient(mu: FloatArray, rho: float, n: float) -> tuple[FloatArray,
 
 def _few_cosines(mu: FloatArray) -> tuple[FloatArray, IntArray] | None:
     """Distinct cosines and the index of each `mu` among them; None where they are many."""
-    if mu.size > _SEARCHED:
+    if mu.size > _MOST_SEARCHED:
         return None
     cosines, place = np.unique(mu, return_inverse=True)
     return (cosines, place.reshape(mu.shape)) if cosines.size <= _FEW_COSINES else None

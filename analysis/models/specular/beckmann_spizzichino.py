@@ -26,7 +26,7 @@ from analysis.models.specular.surface_statistics import (
     curvature_radius,
     unshadowed_deg,
 )
-from analysis.models.specular.torrance_sparrow import off_mirror2
+from analysis.models.specular.torrance_sparrow import tangential_squared
 from analysis.models.validity import either_grazes, valid_except
 from instrument.geometry import FloatArray, Geometry
 
@@ -167,13 +167,13 @@ def geometric_factor(geometry: Geometry) -> FloatArray:
     """
     cos_i = np.cos(geometry.theta_i)
     along = cos_i + np.cos(geometry.theta_r)
-    return np.asarray((off_mirror2(geometry) + along * along) / (2 * cos_i * along))
+    return np.asarray((tangential_squared(geometry) + along * along) / (2 * cos_i * along))
 
 
 def lobe_exponent(geometry: Geometry, correlation_length: float) -> FloatArray:
     """q = v_xy² T²/4, dimensionless, of the geometry's shape: a term of the sum has e^{-q/m}."""
     check_lengths(0.0, correlation_length)
-    return (K * correlation_length) ** 2 / 4 * off_mirror2(geometry)
+    return (K * correlation_length) ** 2 / 4 * tangential_squared(geometry)
 
 
 def lobe_factor(geometry: Geometry, correlation_length: float) -> FloatArray:
@@ -196,7 +196,9 @@ def _coherent(
 # The sum over m.
 
 BLOCK = 4096  # elements at a time: what a core's own cache holds
-FEW = 40.0  # a largest term below this: the sum term by term; from here on as an integral
+TERMWISE_BELOW = (
+    40.0  # a largest term below this: the sum term by term; from here on as an integral
+)
 STEP = 0.75  # of a standard deviation of the summand: the trapezoid's error is e^{-2π²/0.75²}
 LEFT, RIGHT = 10, 13  # steps to either side: beyond them less than 1e-13 of a Poisson's sum
 TINY = 1e-300
@@ -229,7 +231,7 @@ def poisson_sum(g: FloatArray, q: FloatArray, weight: Weight) -> FloatArray:
 
 def _block(g: FloatArray, q: FloatArray, weight: Weight) -> FloatArray:
     peak = largest_term(g, q)
-    few = peak < FEW
+    few = peak < TERMWISE_BELOW
     if few.all():
         return _term_by_term(g, q, float(peak.max(initial=0.0)), weight)
     if not few.any():

@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity, cached_per_geometry
-from analysis.models.specular.torrance_sparrow import off_mirror2
+from analysis.models.specular.torrance_sparrow import tangential_squared
 from analysis.models.validity import GRAZING, both_graze, valid_except, valid_unless_both_graze
 from instrument.geometry import FloatArray, Geometry
 
@@ -108,7 +108,7 @@ def _factors(
 @cached_per_geometry
 def _half_vector(geometry: Geometry) -> tuple[FloatArray, ...]:
     """cos^2(theta_a), sin^2(theta_a) and cos(theta')."""
-    across2 = off_mirror2(geometry)
+    across2 = tangential_squared(geometry)
     along2 = np.square(np.cos(geometry.theta_i) + np.cos(geometry.theta_r))
     length2 = across2 + along2
     cos_half = np.minimum(np.sqrt(length2) / 2, 1.0)

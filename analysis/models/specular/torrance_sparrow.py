@@ -132,14 +132,14 @@ def half_vector(geometry: Geometry) -> tuple[FloatArray, ...]:
     theta_a is the angle from the sample's normal to the vector half-way between lamp and camera,
     theta' the angle from that vector to either. Arrays of the geometry's shape.
     """
-    across2 = off_mirror2(geometry)
+    across2 = tangential_squared(geometry)
     along = np.cos(geometry.theta_i) + np.cos(geometry.theta_r)
     length = np.sqrt(across2 + along * along)
     return np.arctan2(np.sqrt(across2), along), along / length, length / 2
 
 
 @cached_per_geometry
-def off_mirror2(geometry: Geometry) -> FloatArray:
+def tangential_squared(geometry: Geometry) -> FloatArray:
     """Squared length of the tangential part of the sum of the unit vectors to lamp and camera.
 
     sin²θ_i + sin²θ_r + 2 sinθ_i sinθ_r cos dphi, as a sum of squares: nothing cancels near the

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity
-from analysis.models.specular.torrance_sparrow import SIGMA_DEG, half_vector, off_mirror2
+from analysis.models.specular.torrance_sparrow import SIGMA_DEG, half_vector, tangential_squared
 from analysis.models.validity import either_grazes, valid_except
 from instrument.geometry import FloatArray, Geometry
 
@@ -139,7 +139,7 @@ def mirror_angle(geometry: Geometry) -> FloatArray:
     Of the geometry's shape. Computed from the chord, so that small angles are exact.
     """
     up = np.cos(geometry.theta_i) - np.cos(geometry.theta_r)
-    chord = np.sqrt(off_mirror2(geometry) + up * up)
+    chord = np.sqrt(tangential_squared(geometry) + up * up)
     return np.asarray(2 * np.arcsin(np.minimum(chord / 2, 1.0)))
 
 

@@ -27,7 +27,7 @@ from analysis.models.specular.beckmann_spizzichino import (
 from analysis.models.specular.surface_statistics import slope_scale
 from analysis.models.specular.torrance_sparrow import (
     half_vector,
-    off_mirror2,
+    tangential_squared,
     torrance_sparrow_full,
 )
 from instrument.geometry import FloatArray, Geometry
@@ -202,7 +202,7 @@ def test_the_wave_vector_and_the_half_vector_agree(
 ) -> None:
     geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
     v_x, v_y, v_z = wave_vector(geometry)
-    across2 = (2 * math.pi) ** 2 * off_mirror2(geometry)
+    across2 = (2 * math.pi) ** 2 * tangential_squared(geometry)
     assert v_x**2 + v_y**2 == pytest.approx(across2, rel=1e-9, abs=1e-13)
     # (57): tan(alpha) = v_xy / v_z; D = cos(theta') / (cos(alpha) cos(theta_i))
     theta_a, cos_a, cos_half = half_vector(geometry)
