@@ -196,9 +196,7 @@ def _coherent(
 # The sum over m.
 
 BLOCK = 4096  # elements at a time: what a core's own cache holds
-TERMWISE_BELOW = (
-    40.0  # a largest term below this: the sum term by term; from here on as an integral
-)
+TERMWISE_BELOW = 40.0  # largest term from which on the sum is computed as an integral
 STEP = 0.75  # of a standard deviation of the summand: the trapezoid's error is e^{-2π²/0.75²}
 LEFT, RIGHT = 10, 13  # steps to either side: beyond them less than 1e-13 of a Poisson's sum
 TINY = 1e-300
