@@ -21,6 +21,9 @@ MAX_LINES = 3
 # Angles that differ by less are one setting of the lamp, or one plane of the camera.
 _SAME_ANGLE_DEG = 0.25
 _GRID_STEP_DEG = 1.0
+_COLUMNS = (
+    "dphi_deg", "theta_r_deg", "brdf", "u_brdf", "radiance", "u_radiance", "flags", "fitted",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,20 +98,14 @@ class ReportData:
     times: Rows = ()
 
     def __post_init__(self) -> None:
-        points = len(self.theta_i_deg)
-        for name in (
-            *("dphi_deg", "theta_r_deg", "brdf", "u_brdf", "radiance", "u_radiance"),
-            *("flags", "fitted"),
-        ):
-            if len(getattr(self, name)) != points:
-                raise ValueError(f"{name}: {len(getattr(self, name))} entries for {points} points")
-        entered = int(np.count_nonzero(self.fitted))
-        for candidate in self.candidates:
-            if candidate.residuals is not None and len(candidate.residuals) != entered:
-                raise ValueError(
-                    f"{candidate.name}: {len(candidate.residuals)} residuals for {entered} "
-                    "points in the fit"
-                )
+        points, fitted = len(self.theta_i_deg), int(np.count_nonzero(self.fitted))
+        for name in _COLUMNS:
+            if (size := len(getattr(self, name))) != points:
+                raise ValueError(f"{name}: {size} entries for {points} points")
+        for c in self.candidates:
+            if c.residuals is not None and len(c.residuals) != fitted:
+                size = len(c.residuals)
+                raise ValueError(f"{c.name}: {size} residuals for {fitted} points in the fit")
 
     @property
     def has_brdf(self) -> bool:
@@ -131,13 +128,9 @@ class ReportData:
     def ranked(self) -> tuple[Candidate, ...]:
         """The candidates by rising BIC, the chosen one first; those that failed come last."""
 
-        def rank(candidate: Candidate) -> tuple[bool, bool, float]:
-            bic = candidate.bic if candidate.bic is not None else np.inf
-            return (
-                not candidate.chosen,
-                not candidate.converged,
-                bic if np.isfinite(bic) else np.inf,
-            )
+        def rank(c: Candidate) -> tuple[bool, bool, float]:
+            bic = c.bic if c.bic is not None and np.isfinite(c.bic) else np.inf
+            return not c.chosen, not c.converged, bic
 
         return tuple(sorted(self.candidates, key=rank))
 
