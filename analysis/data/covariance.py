@@ -93,10 +93,6 @@ class Covariance:
         """Independent part (N,) of each point's standard uncertainty, in the data's unit."""
         return np.sqrt(self.variance)
 
-    def matrix(self) -> FloatArray:
-        """C as a dense array (N, N), in the square of the data's unit."""
-        return np.asarray(np.diag(self.variance) + _product(self.common, self.common.T))
-
 
 def _scaled(columns: Columns, by: FloatArray) -> Columns:
     """Each row (N, K) times its own factor (N,)."""
