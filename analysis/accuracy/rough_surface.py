@@ -65,7 +65,7 @@ ROUGH_SURFACE = MethodFamily(
             *(200, 0.45, 90, 0.02),
         ),
         _form("functional", "oren_nayar", oren_nayar_brdf, 500, 1.0, 120, 0.03),
-        Method("table", tabulated_brdf, partial(map_bound, "table"), fixed_cost(1200, 26)),
+        Method("table", tabulated_brdf, partial(map_bound, "table"), fixed_cost(3200, 8.5)),
         Method(
             "coarse", _rule(COARSE), partial(map_bound, "coarse"), fixed_cost(30e3, 700, 1000, 5.3)
         ),

@@ -10,7 +10,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtr
 
 from analysis.data.measurements import Measurements
 from analysis.data.sweeps import Sweep, plane_and_view, sweeps
@@ -31,7 +30,7 @@ def runs_probability(m: Measurements, residuals: FloatArray) -> float:
     runs, expected, variance = np.sum(np.reshape(counted, (-1, 3)), axis=0)
     if variance <= 0:
         return 1.0
-    return float(ndtr((runs + 0.5 - expected) / math.sqrt(variance)))
+    return 0.5 * math.erfc((expected - runs - 0.5) / math.sqrt(2 * variance))
 
 
 def _runs(residuals: FloatArray) -> tuple[float, float, float]:

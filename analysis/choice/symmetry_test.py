@@ -10,12 +10,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtrc
 
 from analysis.data.covariance import Covariance, angle_sensitivity, append_column, full_covariance
 from analysis.data.measurements import Measurements
 from analysis.data.sweeps import plane_and_view, sweeps
-from analysis.fit.criteria import SIGNIFICANCE
+from analysis.fit.criteria import SIGNIFICANCE, probability
 from instrument.geometry import Brdf, IntArray
 
 # Nearer to normal incidence, or to the plane dphi = 90 degrees, any surface is too symmetric.
@@ -66,9 +65,9 @@ def symmetry(m: Measurements, smooth: Brdf, noise: float) -> Symmetry:
     total = m.brdf[lamp] + m.brdf[mirror]
     white = _covariance(m, smooth, noise, lamp, mirror).whiten(difference)
     chi2 = float(white @ white)
-    probability = float(chdtrc(float(len(pairs)), chi2))
-    outcome = "rough" if probability < SIGNIFICANCE else "smooth"
-    return Symmetry(outcome, len(pairs), float(np.mean(difference) / np.mean(total)), probability)
+    p = probability(chi2, len(pairs))
+    outcome = "rough" if p < SIGNIFICANCE else "smooth"
+    return Symmetry(outcome, len(pairs), float(np.mean(difference) / np.mean(total)), p)
 
 
 def _pairs(m: Measurements) -> list[tuple[int, int]]:

@@ -9,16 +9,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array, hstack
 
 from analysis.data.measurements import Measurements
 from instrument.geometry import BoolArray, Brdf, FloatArray, Geometry, IntArray
 
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+    Columns = FloatArray | csr_array
+
 LAMP_LEVEL = "lamp level"
-Columns = FloatArray | csr_array
 
 _MAX_DENSE = 100_000  # entries of a dense array; larger ones are mostly zeros, so sparse
 _U_UNKNOWN_LEVEL = 1.0  # relative u of a lamp level of which nothing is known
@@ -105,6 +108,8 @@ def append_column(columns: Columns, column: FloatArray) -> Columns:
     """Append a column (N,) to columns (N, K), in the same unit, dense or sparse."""
     if isinstance(columns, np.ndarray):
         return np.column_stack([columns, column])
+    from scipy.sparse import csr_array, hstack  # heavy, and for long scans only
+
     return csr_array(hstack([columns, csr_array(column[:, np.newaxis])]))
 
 
@@ -151,21 +156,39 @@ def full_covariance(
         groups.append((LAMP_LEVEL, _U_UNKNOWN_LEVEL * f, m.lamp_setting))
     second_order = [_second_order_u(m, smooth, **u) for _, u, _, _ in angles]
     variance = np.square(m.u_random) + np.sum(np.square(second_order), axis=0)
-    columns, names = [], []
+    rows: list[IntArray] = []
+    columns: list[IntArray] = []
+    shifts: list[FloatArray] = []
+    names: list[str] = []
     for name, shift, group in groups:
-        single, several, labels = _columns(shift, group)
+        single, row, column, labels = _columns(shift, group)
         variance = variance + np.square(single)
-        columns.append(several)
+        rows.append(row)
+        columns.append(len(names) + column)
+        shifts.append(shift[row])
         names += [f"{name}{label}" for label in labels]
-    common = csr_array(hstack(columns))
-    dense = common.shape[0] * common.shape[1] <= _MAX_DENSE
-    return Covariance(variance, common.toarray() if dense else common, tuple(_numbered(names)))
+    places = np.concatenate(rows), np.concatenate(columns)
+    common = _matrix(np.concatenate(shifts), places, (m.size, len(names)))
+    return Covariance(variance, common, tuple(_numbered(names)))
+
+
+def _matrix(
+    values: FloatArray, places: tuple[IntArray, IntArray], shape: tuple[int, int]
+) -> Columns:
+    """Matrix with values at these rows and columns, sparse where a dense one would be large."""
+    if shape[0] * shape[1] > _MAX_DENSE:
+        from scipy.sparse import csr_array  # heavy, and for long scans only
+
+        return csr_array((values, places), shape=shape)
+    matrix = np.zeros(shape)
+    matrix[places] = values
+    return matrix
 
 
 def _columns(
     shift: FloatArray, group: IntArray | FloatArray
-) -> tuple[FloatArray, csc_array, list[str]]:
-    """Shifts (N,) of points that are alone in their group; column and label of each larger group.
+) -> tuple[FloatArray, IntArray, IntArray, list[str]]:
+    """Shifts (N,) of points alone in their group; rows, columns and labels of the larger groups.
 
     The points of a group have the same number in `group`, or the same angle in degrees.
     """
@@ -175,13 +198,11 @@ def _columns(
     column = np.full(values.size, -1)
     column[several] = np.arange(several.size)
     rows = np.flatnonzero(column[member] >= 0)
-    places = (rows, column[member[rows]])
-    columns = csc_array((shift[rows], places), shape=(shift.size, several.size))
     if np.issubdtype(group.dtype, np.floating):
         labels = [f" at {value:g}°" for value in values[several]]
     else:
         labels = [f" {value + 1}" if values.size > 1 else "" for value in values[several]]
-    return np.where(single, shift, 0.0), columns, labels
+    return np.where(single, shift, 0.0), rows, column[member[rows]], labels
 
 
 def _numbered(names: list[str]) -> Iterator[str]:

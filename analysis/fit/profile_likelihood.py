@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from analysis.fit.levenberg_marquardt import Minimum
 from analysis.fit.problem import Problem
@@ -104,6 +103,8 @@ class _Profile:
         middle = float(self.best.x[self.index])
         if middle == bound or self.excess(bound) <= 0:
             return bound
+        from scipy.optimize import brentq  # heavy: most fits need no profile
+
         inner, outer = self._bracket(middle, bound)
         return float(brentq(self.excess, inner, outer, xtol=_RTOL * abs(outer - middle)))
 

@@ -31,8 +31,11 @@ def test_the_help_imports_nothing_heavy(heavy: str) -> None:
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
 
 
-def test_the_report_is_the_only_one_that_needs_matplotlib() -> None:
-    script = "import acquisition.commands.scan, sys; sys.exit('matplotlib' in sys.modules)"
+@pytest.mark.parametrize("heavy", ["scipy", "matplotlib", "serial", "pymodbus"])
+def test_scan_and_fit_import_no_library_that_most_runs_do_not_need(heavy: str) -> None:
+    """SciPy is for profiles, long scans and nothing else; Matplotlib for the report."""
+    needed = "acquisition.commands.scan, acquisition.results.finish"
+    script = f"import {needed}, sys; sys.exit('{heavy}' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
 
 

@@ -14,15 +14,12 @@ from __future__ import annotations
 import math
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.models.rough.grid_spline import GridSpline
 from analysis.models.rough.oren_nayar_forms import SIGMA_DEG
 from instrument.geometry import FloatArray, Geometry
-
-if TYPE_CHECKING:
-    from scipy.interpolate import NdBSpline
 
 LIMIT_DEG = 85.0
 """Largest angle from the normal in the table: beyond, the integral itself is less certain."""
@@ -47,9 +44,10 @@ def tabulated_brdf(geometry: Geometry, albedo: float, sigma_deg: float) -> Float
 
     Arguments and result as in `Model.brdf`.
     """
-    at = np.stack(np.broadcast_arrays(np.float64(sigma_deg), *table_coordinates(geometry)), axis=-1)
-    direct, twice = np.moveaxis(_splines()(at, extrapolate=False), -1, 0)
-    return np.asarray(albedo / math.pi * (direct + albedo * twice))
+    at = np.broadcast_arrays(*table_coordinates(geometry))
+    direct, twice = _spline().at_first(sigma_deg).at(*(x.ravel() for x in at))
+    brdf = albedo / math.pi * (direct + albedo * twice)
+    return np.asarray(brdf.reshape(at[0].shape))
 
 
 def table_coordinates(geometry: Geometry) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -64,16 +62,9 @@ def table_coordinates(geometry: Geometry) -> tuple[FloatArray, FloatArray, Float
 
 
 @cache
-def _splines() -> NdBSpline:
-    """Cubic splines through the table, for both parts at once."""
-    from scipy.interpolate import NdBSpline, make_interp_spline  # heavy, and used here only
-
+def _spline() -> GridSpline:
+    """Cubic spline through the table, for both parts at once."""
     with np.load(FILE) as table:
         axes = [table[name] for name in GRID]
         values = table["direct_and_twice"].astype(np.float64)
-    knots = []
-    for axis, nodes in enumerate(axes):
-        spline = make_interp_spline(nodes, values, k=3, axis=axis)
-        knots.append(spline.t)
-        values = np.moveaxis(spline.c, 0, axis)
-    return NdBSpline(tuple(knots), values, 3)
+    return GridSpline.through(axes, values)

@@ -33,5 +33,8 @@ def test_without_stated_u_the_criteria_use_the_residual_sum_of_squares() -> None
 
 
 def test_the_probability_of_chi2_is_the_upper_tail() -> None:
-    assert probability(12.0, 7) == pytest.approx(chi2.sf(12.0, 7))
+    for dof in (1, 2, 3, 7, 8, 93, 94, 20_001):
+        for value in (0.0, 0.1, 0.5 * dof, dof, 1.2 * dof, 2.0 * dof, math.inf):
+            expected = float(chi2.sf(value, dof))
+            assert probability(value, dof) == pytest.approx(expected, rel=1e-9, abs=1e-300)
     assert probability(12.0, 0) == 1.0  # nothing left to test
