@@ -1,7 +1,7 @@
 """Schemas of earlier versions of the program, whose records still open, resume and report.
 
-Their tables hold the same columns as today's but enforce no rules, so `validation` checks every
-value by a query. A record keeps the schema with which it began.
+Their tables have the columns of the current schema but no rules, so `validation` checks every value
+by a query. A record keeps the schema with which it was created.
 """
 
 _READING_3 = (

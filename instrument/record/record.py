@@ -23,7 +23,7 @@ from instrument.devices import Frame
 from instrument.errors import GonioError, InputError, StorageError
 from instrument.record.network_share import network_share
 from instrument.record.reading import Check, Preview, Reading
-from instrument.record.schema import MARKS, begin, connect
+from instrument.record.schema import LEAST_SQLITE, MARKS, begin, connect
 from instrument.record.validation import check_files, check_schema, check_values
 from instrument.text.atomic_file import disk_full, explain_os_error, make_folder, sync_folder
 
@@ -43,7 +43,7 @@ class Record(Closeable):
     @classmethod
     def create(cls, folder: Path, meta: Mapping[str, str]) -> Record:
         """Create a record in `folder`, which must be absent or empty; else `InputError`."""
-        _refuse_network_share(folder)
+        _require_support(folder)
         try:
             if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
                 raise InputError(
@@ -63,7 +63,7 @@ class Record(Closeable):
     @classmethod
     def open(cls, folder: Path) -> Record:
         """Open the record of an earlier run; `InputError` if it is missing, damaged or foreign."""
-        _refuse_network_share(folder)
+        _require_support(folder)
         path = folder / FILE_NAME
         if not path.is_file():
             raise InputError(f"{folder}: no {FILE_NAME} there: name the folder of a run")
@@ -293,7 +293,13 @@ def _explain(error: OSError | sqlite3.Error, folder: Path) -> str:
     return f"cannot be written ({error}): look at the disk"
 
 
-def _refuse_network_share(folder: Path) -> None:
+def _require_support(folder: Path) -> None:
+    """Refuse a Python with an old SQLite, and a folder on a network share."""
+    if sqlite3.sqlite_version_info < LEAST_SQLITE:
+        raise InputError(
+            f"{folder}: SQLite {sqlite3.sqlite_version} of this Python cannot hold a record; "
+            f"needed: {'.'.join(map(str, LEAST_SQLITE))} or later: use another Python"
+        )
     share = network_share(folder)
     if share is not None:
         raise InputError(

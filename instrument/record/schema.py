@@ -1,9 +1,9 @@
-"""Schema of the run record: its tables, the allowed values of each column, and connecting to it.
+"""Schema of the run record: its tables, the allowed values of each column, and the connection.
 
-All tables are STRICT, and every rule is a CHECK whose name says what is allowed, so SQLite itself
-refuses other values when a row is written, and `PRAGMA quick_check` finds them in a file from
-elsewhere. What a released schema is like never changes: a change here needs a new SCHEMA_VERSION,
-and the old tables move to `older_versions`.
+All tables are STRICT, and every rule is a CHECK whose name says what is allowed. SQLite refuses
+other values when a row is written, and `PRAGMA quick_check` finds them in a file from elsewhere. A
+released schema never changes: a change here needs a new SCHEMA_VERSION, and the SQL of the old
+version moves to `older_versions`.
 """
 
 from __future__ import annotations
@@ -14,12 +14,11 @@ from pathlib import Path
 from typing import NamedTuple, get_args
 
 from instrument.devices import Surface
-from instrument.errors import InputError
 from instrument.record.reading import Kind
 
 SCHEMA_VERSION = 4
 MOST_BYTES = 128 * 1024**2  # of one text or picture; the largest camera's picture needs half of it
-_LEAST_SQLITE = (3, 37, 0)  # the first with STRICT tables
+LEAST_SQLITE = (3, 37, 0)  # the first with STRICT tables
 _LARGEST = 1e30  # of any number that has no limit of its own
 _LARGEST_WHOLE = 2**53  # larger whole numbers are not exact as floats
 
@@ -151,7 +150,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         *_READING,
     ),
 }
-"""All tables with their columns; the first column tells the rows of a table apart in messages."""
+"""All tables with their columns; the first column identifies a row in messages."""
 
 MARKS = ", ".join("?" * len(_READING))
 """One `?` for each column of a reading."""
@@ -177,11 +176,6 @@ def harden_connection(database: sqlite3.Connection) -> None:
 
 def connect(path: Path) -> sqlite3.Connection:
     """Open a file as a record: hardened, with a write-ahead log, each commit flushed to disk."""
-    if sqlite3.sqlite_version_info < _LEAST_SQLITE:
-        raise InputError(
-            f"{path}: SQLite {sqlite3.sqlite_version} of this Python cannot hold a record; "
-            "needed: 3.37 or later: use another Python"
-        )
     database = sqlite3.connect(path)
     try:
         harden_connection(database)

@@ -1,9 +1,10 @@
-"""Checks before a record is trusted: it may come from anybody, with anything in it.
+"""Checks of a record before it is trusted: it may come from anybody, with any contents.
 
-Checked are the files before SQLite opens them; the tables, which must be exactly those that a
-version of this program makes (a view or a trigger would run code); and every value. The rules for
-values stand in the schema: in a record of today's version `PRAGMA quick_check` verifies them. Only
-what spans several rows, the outlines of the previews and the encoding of texts are checked here.
+They cover the files, before SQLite opens them; the schema, which must be exactly that of a version
+of this program, since a view or a trigger would run code; and every value. The rules for values are
+part of the schema: in a record of the current version `PRAGMA quick_check` verifies them, and
+queries here do so in older ones. No schema can express the rules across rows, those for the
+outlines of previews and the encoding of texts; they are checked here, too.
 """
 
 from __future__ import annotations
@@ -22,12 +23,12 @@ from instrument.record.older_versions import OLDER_SQL
 from instrument.record.schema import SCHEMA_VERSION, SQL, TABLES
 
 MOST_READINGS = 2_000_000
-MOST_WORK = 100_000_000  # points times blocks and checks at a resume: reduction visits each pair
+MOST_WORK = 100_000_000  # points times (blocks + resumes): reduction visits each pair
 _MOST_PREVIEW_BYTES = 512 * 1024**2  # of all previews together: the report holds them in memory
 _LARGEST_PIXEL = 1e30
 _KNOWN_SQL = {**OLDER_SQL, SCHEMA_VERSION: SQL}
 
-NOT_BEGUN = (
+_NOT_BEGUN = (
     "stopped before the record had begun, so nothing was measured: remove the folder and run again"
 )
 _ADVICE = "take an undamaged copy of the run"
@@ -46,17 +47,17 @@ def check_files(folder: Path, record: str, *others: str) -> None:
             raise InputError(f"{path}: is a link or no file; allowed: a regular file: {_ADVICE}")
     journal = folder / f"{record}-journal"
     if journal.is_symlink() or journal.exists():
-        raise InputError(f"{journal}: {NOT_BEGUN}; else it is no run of this program: {_ADVICE}")
+        raise InputError(f"{journal}: {_NOT_BEGUN}; else it is no run of this program: {_ADVICE}")
 
 
 def check_schema(database: sqlite3.Connection, path: Path) -> int:
     """Return the schema version of a record whose tables are exactly those of that version.
 
-    Raises `InputError` for anything else, and `sqlite3.Error` where the file cannot be read.
+    Raises `InputError` for anything else, and `sqlite3.Error` if the file cannot be read.
     """
     found = _schema(database)
     if not found:
-        raise InputError(f"{path.parent}: {NOT_BEGUN}")
+        raise InputError(f"{path.parent}: {_NOT_BEGUN}")
     _refuse_code(found, path)
     row = database.execute("SELECT value FROM meta WHERE key = 'schema_version'").fetchone()
     version = {str(number): number for number in _KNOWN_SQL}.get(row and row[0])
@@ -77,7 +78,8 @@ def _compare(found: dict[str, tuple[str, object]], version: int, path: Path) -> 
     for name in [n for n in found if n not in wanted or found[n] != wanted[n]]:
         kind, _ = found[name]
         raise InputError(
-            f"{path}: holds the {kind} {name[:40]!r}, which this program did not make so: {_ADVICE}"
+            f"{path}: holds the {kind} {name[:40]!r}, which this program did not create so: "
+            f"{_ADVICE}"
         )
     missing = [name for name in wanted if name not in found]
     if missing:
@@ -89,7 +91,7 @@ def _refuse_code(found: dict[str, tuple[str, object]], path: Path) -> None:
     for name, (kind, sql) in found.items():
         if kind not in ("table", "index") or "VIRTUAL" in str(sql).upper()[:40]:
             raise InputError(
-                f"{path}: holds the {kind} {name[:40]!r}, which no record of this program does: "
+                f"{path}: holds the {kind} {name[:40]!r}, which no record of this program has: "
                 f"{_ADVICE}"
             )
 
@@ -108,7 +110,7 @@ def _schema(database: sqlite3.Connection) -> dict[str, tuple[str, object]]:
 def check_values(database: sqlite3.Connection, path: Path, version: int) -> None:
     """Refuse values that no scan can have written, in a record whose schema has been checked.
 
-    Raises `InputError`, and `sqlite3.Error` where the file is damaged.
+    Raises `InputError`, and `sqlite3.Error` if the file is damaged.
     """
     fault = database.execute("PRAGMA quick_check(1)").fetchone()[0]
     enforced = version == SCHEMA_VERSION and fault == "ok"

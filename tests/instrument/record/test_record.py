@@ -91,3 +91,12 @@ def test_no_record_on_a_network_share(tmp_path: Path, monkeypatch: pytest.Monkey
         with pytest.raises(InputError, match=r"network share \(nfs4\).*a folder on a local disk"):
             way()
     assert not (tmp_path / "run").exists()
+
+
+def test_a_python_with_an_old_sqlite_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sqlite3, "sqlite_version_info", (3, 36, 0))
+    with pytest.raises(InputError, match=r"needed: 3\.37\.0 or later: use another Python"):
+        Record.create(tmp_path / "run", {})
+    assert not (tmp_path / "run").exists()

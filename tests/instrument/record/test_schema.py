@@ -14,7 +14,6 @@ from pathlib import Path
 
 import pytest
 
-from instrument.errors import InputError
 from instrument.record import schema
 from instrument.record.older_versions import OLDER_SQL
 from instrument.record.reading import Check, Reading
@@ -98,11 +97,3 @@ def test_a_value_that_is_not_allowed_cannot_be_written(
 def test_one_preview_has_at_most_128_mb(database: sqlite3.Connection) -> None:
     with pytest.raises(sqlite3.IntegrityError, match="png: bytes, at most 134217728"):
         database.execute("INSERT INTO preview VALUES (0, '', zeroblob(134217729), '[]')")
-
-
-def test_a_python_with_an_old_sqlite_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(sqlite3, "sqlite_version_info", (3, 36, 0))
-    with pytest.raises(InputError, match=r"needed: 3\.37 or later: use another Python"):
-        Record.create(tmp_path / "run", {})

@@ -45,13 +45,13 @@ def test_a_schema_with_fewer_rules_is_unknown(tmp_path: Path, old: str, new: str
     small_record(tmp_path / "run").close()
     sent = copy_of(tmp_path / "run", tmp_path)
     sent.widen(old, new)
-    with pytest.raises(InputError, match="which this program did not make so"):
+    with pytest.raises(InputError, match="which this program did not create so"):
         Record.open(sent.folder)
 
 
 def test_a_schema_of_one_version_under_the_number_of_another_is_refused(sent: Sent) -> None:
     sent.forge("UPDATE meta SET value = 7 - value WHERE key = 'schema_version'")
-    with pytest.raises(InputError, match="holds the table 'meta', which this program did not make"):
+    with pytest.raises(InputError, match="the table 'meta', which this program did not create"):
         Record.open(sent.folder)
 
 

@@ -152,7 +152,7 @@ REFUSED: dict[str, tuple[Callable[[Sent], None], str]] = {
     ),
     "a column without its rule": (
         lambda sent: sent.widen("signal_dn REAL", "signal_dn BLOB"),
-        "holds the table 'reading', which this program did not make so",
+        "holds the table 'reading', which this program did not create so",
     ),
     "text for a number": (_forged("signal_dn", "'many'"), "signal_dn is 'many'"),
     "bytes for a number": (_forged("frames", "x'00'"), "frames is b'\\x00'"),
