@@ -28,7 +28,7 @@ MAX_REPORTED = 200  # mistakes per file; more would scroll the first ones off th
 AnySection = TypeVar("AnySection", bound=Section)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Loaded:
     """Valid protocol and rig that fit each other, with the texts of their files."""
 
@@ -70,7 +70,14 @@ def load_protocol(
     files = [file] if rig_file is None else [file, rig_file]
     if protocol is None or rig is None or rig_file is None or any(f.found for f in files):
         raise InputError(*_report(*files))
-    return Loaded(protocol, path, file.marked.text, rig, rig_file.path, rig_file.marked.text)
+    return Loaded(
+        protocol=protocol,
+        protocol_path=path,
+        protocol_text=file.marked.text,
+        rig=rig,
+        rig_path=rig_file.path,
+        rig_text=rig_file.marked.text,
+    )
 
 
 def _rig_file(protocol: _File, rig_path: Path | None) -> _File | None:

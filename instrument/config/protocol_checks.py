@@ -36,7 +36,7 @@ _PARAMETERS: TypeAdapter[Any] = TypeAdapter(dict[str, Finite])
 def rig_mistakes(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -> Mistakes:
     """Yield what the rig cannot do of the protocol: path in the protocol, and message."""
     for axis in AXES:
-        limits = _sound(_AXIS, rig, "axes", axis)
+        limits = _valid(_AXIS, rig, "axes", axis)
         if limits is None:
             continue
         place = f"{rig_name}:{rig.mark(('axes', axis)).line}"
@@ -67,8 +67,8 @@ def own_mistakes(protocol: MarkedYaml, check_model: ModelCheck | None) -> Mistak
             if path[0] == "sweeps" and _impossible(axis, value):
                 yield path, f"{value:g} deg; allowed: {low:g} to {high:g} deg from the normal"
     for key in ("width_mm", "height_mm"):
-        window = _sound(_POSITIVE, protocol, "window", key)
-        sample = _sound(_POSITIVE, protocol, "sample", key)
+        window = _valid(_POSITIVE, protocol, "window", key)
+        sample = _valid(_POSITIVE, protocol, "sample", key)
         if window is not None and sample is not None and window > sample:
             text = f"{window:g} mm is larger than the sample; allowed: at most {sample:g} mm"
             yield ("window", key), text
@@ -77,7 +77,7 @@ def own_mistakes(protocol: MarkedYaml, check_model: ModelCheck | None) -> Mistak
         yield from _model_mistakes(protocol, check_model)
 
 
-def _sound(kind: TypeAdapter[Any], marked: MarkedYaml, *path: str | int) -> Any:
+def _valid(kind: TypeAdapter[Any], marked: MarkedYaml, *path: str | int) -> Any:
     try:
         return kind.validate_python(marked.get(path), strict=True)
     except ValidationError:
@@ -101,7 +101,7 @@ def _written_angles(protocol: MarkedYaml, axis: str) -> Iterator[tuple[KeyPath, 
         ends = [(*angles, "start"), (*angles, "stop")]
         paths += [(*angles, k) for k in range(_items(protocol.get(angles)))] or ends
     for path in paths:
-        value = _sound(_DEGREES, protocol, *path)
+        value = _valid(_DEGREES, protocol, *path)
         if value is not None:
             yield path, value
     if axis == "theta_r":
@@ -114,14 +114,14 @@ def _reference_angles(protocol: MarkedYaml) -> Iterator[tuple[KeyPath, float]]:
         if isinstance(block, dict):
             path: KeyPath = ("references", reference, "theta_r_deg")
             default = section.model_fields["theta_r_deg"].default
-            value = _sound(_DEGREES, protocol, *path) if "theta_r_deg" in block else default
+            value = _valid(_DEGREES, protocol, *path) if "theta_r_deg" in block else default
             if value is not None:
                 yield path, value
 
 
 def _window_past_picture(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -> Mistakes:
     width, columns, rows = (
-        _sound(_POSITIVE, rig, "camera", key) for key in ("field_width_mm", "width_px", "height_px")
+        _valid(_POSITIVE, rig, "camera", key) for key in ("field_width_mm", "width_px", "height_px")
     )
     if width is None:
         return
@@ -129,7 +129,7 @@ def _window_past_picture(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -
     if columns is not None and rows is not None:
         field_mm["height_mm"] = width * rows / columns
     for key, size in field_mm.items():
-        window = _sound(_POSITIVE, protocol, "window", key)
+        window = _valid(_POSITIVE, protocol, "window", key)
         if window is not None and window > size:
             place = f"{rig_name}:{rig.mark(('camera', 'field_width_mm')).line}"
             text = f"{window:g} mm is larger than the camera's field; allowed: at most {size:g} mm"
@@ -141,7 +141,7 @@ def _repeated(protocol: MarkedYaml) -> Mistakes:
     sweeps: dict[int, list[list[float] | Steps]] = {}
     for sweep in range(_items(protocol.get(("sweeps",)))):
         paths: list[KeyPath] = [("sweeps", sweep, f"{axis}_deg") for axis in AXES]
-        axes = [_sound(_ANGLES, protocol, *path) for path in paths]
+        axes = [_valid(_ANGLES, protocol, *path) for path in paths]
         for path, angles in zip(paths, axes, strict=True):
             if isinstance(angles, list):
                 yield from _twice(path, angles)
@@ -189,13 +189,13 @@ def _shared(sweeps: dict[int, list[list[float] | Steps]]) -> Mistakes:
 def _model_mistakes(protocol: MarkedYaml, check_model: ModelCheck) -> Mistakes:
     paths: list[KeyPath] = [(*_MODELS, k) for k in range(_items(protocol.get(_MODELS)))]
     for path in (*paths, ("simulated_sample", "model")):
-        name = _sound(_NAME, protocol, *path)
+        name = _valid(_NAME, protocol, *path)
         text = None if name is None else check_model(name, None)
         if text is not None:
             yield path, text
         elif name is not None and path not in paths:
             at: KeyPath = ("simulated_sample", "parameters")
-            parameters = _sound(_PARAMETERS, protocol, *at)
+            parameters = _valid(_PARAMETERS, protocol, *at)
             text = None if parameters is None else check_model(name, parameters)
             if text is not None:
                 yield at, text

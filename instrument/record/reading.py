@@ -10,7 +10,7 @@ from instrument.devices import Surface
 Kind = Literal["point", "tile", "drift"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
     """One measured geometry in counts (DN): the mean over the window, its uncertainties, its flags.
 
@@ -51,7 +51,7 @@ class Reading:
     flags: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
     """Drift check at a resume; `reading.step` is the drift check of the plan that it repeats.
 

@@ -12,7 +12,7 @@ import json
 import math
 import os
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import astuple
 from pathlib import Path
@@ -23,12 +23,13 @@ from instrument.devices import Frame
 from instrument.errors import GonioError, InputError, StorageError
 from instrument.record.network_share import network_share
 from instrument.record.reading import Check, Preview, Reading
-from instrument.record.schema import LEAST_SQLITE, MARKS, begin, connect
+from instrument.record.schema import LEAST_SQLITE, MARKS, TABLES, begin, connect
 from instrument.record.validation import check_files, check_schema, check_values
 from instrument.text.atomic_file import disk_full, explain_os_error, make_folder, sync_folder
 
 FILE_NAME = "record.sqlite"
 LOCK_NAME = ".scanning"
+_READING_NAMES = [column.name for column in TABLES["reading"]]
 _NOT_PERMITTED = ("SQLITE_READONLY", "SQLITE_PERM", "SQLITE_CANTOPEN")
 
 
@@ -169,14 +170,20 @@ class Record(Closeable):
     def readings(self) -> list[Reading]:
         """Return all measured geometries in the plan's order."""
         rows = self._db.execute("SELECT * FROM reading ORDER BY step").fetchall()
-        return [Reading(*_with_nan(row)) for row in rows]
+        return [_reading(row) for row in rows]
 
     def checks(self) -> list[Check]:
         """Return the drift checks that were made at each resume, in order."""
         rows = self._db.execute("SELECT * FROM drift_at_resume ORDER BY rowid").fetchall()
         return [
-            Check(a, b, u, bool(jumped), Reading(*_with_nan(tuple(row))))
-            for a, b, u, jumped, *row in rows
+            Check(
+                before_step=before_step,
+                expected=expected,
+                u_expected=u_expected,
+                jumped=bool(jumped),
+                reading=_reading(row),
+            )
+            for before_step, expected, u_expected, jumped, *row in rows
         ]
 
     def settings(self) -> dict[str, dict[str, str]]:
@@ -308,6 +315,7 @@ def _require_support(folder: Path) -> None:
         )
 
 
-def _with_nan(row: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Restore NaN, which SQLite stores as NULL."""
-    return tuple(math.nan if value is None else value for value in row)
+def _reading(row: Iterable[Any]) -> Reading:
+    """Return a row as a reading; SQLite stores NaN as NULL."""
+    values: list[Any] = [math.nan if value is None else value for value in row]
+    return Reading(**dict(zip(_READING_NAMES, values, strict=True)))

@@ -40,7 +40,7 @@ class Column(NamedTuple):
             sql += f' CONSTRAINT "{self.name}: {self.allowed}" CHECK ({self.condition})'
         return sql
 
-    def sound(self) -> str:
+    def full_condition(self) -> str:
         """Return the SQL condition for type and value, for a table that enforces neither."""
         sql = f"typeof({self.name}) = '{self.sql_type.lower()}'"
         sql += f" AND ({self.condition})" * bool(self.condition)

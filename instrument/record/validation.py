@@ -130,8 +130,8 @@ def _wrong_values(database: sqlite3.Connection) -> Iterator[str]:
     for table, columns in TABLES.items():
         key = _short(columns[0].name)
         for column in columns:
-            sql = f"SELECT {key}, {_short(column.name)} FROM {table} WHERE NOT {column.sound()}"
-            for row, value in database.execute(f"{sql} LIMIT 1"):
+            wrong = f"FROM {table} WHERE NOT {column.full_condition()} LIMIT 1"
+            for row, value in database.execute(f"SELECT {key}, {_short(column.name)} {wrong}"):
                 yield f"{table} {row!r}: {column.name} is {value!r}; allowed: {column.allowed}"
 
 

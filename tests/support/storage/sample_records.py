@@ -35,5 +35,8 @@ def small_record(folder: Path) -> Record:
         frame = Frame(None, 0.032, 10.0 * step)  # type: ignore[arg-type]  # the image is not kept
         picture = Preview(step, "a view", b"\x89PNG", [[0.0, 1.5], [2.0, 3.0]])
         record.add_reading(row, picture, [frame], [f"frames/{step}.tiff"])
-    record.add_check(Check(3, 62500.0, 10.0, False, reading(0, kind="drift", time_s=25.0)))
+    again = reading(0, kind="drift", time_s=25.0)
+    record.add_check(
+        Check(before_step=3, expected=62500.0, u_expected=10.0, jumped=False, reading=again)
+    )
     return record
