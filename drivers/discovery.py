@@ -35,7 +35,7 @@ def serial_ports(identify: bool) -> list[str]:
 def identify_controller(port: str) -> str:
     """Send each kind's query to a port and quote the first answer."""
     try:
-        return next(_answers(port), "nobody answers")
+        return next(_answers(port), "no answer")
     except DeviceError as error:
         return str(error)
 

@@ -15,9 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.manual import HandSetAxis
 from instrument.config.load import load_rig
-from instrument.devices import Request
 from instrument.errors import InputError
 from tests.support.command import gonio_here as gonio
 from tests.support.paths import CONFIGS, ROOT
@@ -65,37 +63,6 @@ def test_a_frame_for_aiming(tmp_path: Path) -> None:
     assert raw.dtype == np.uint16
     assert float(raw.mean()) == pytest.approx(found["frame_mean_dn"], rel=0.01)
     assert found["window_max_dn"] <= found["frame_max_dn"] <= found["full_scale_dn"]
-
-
-# The operator.
-
-
-class Answers:
-    """An operator with the answers written down."""
-
-    def __init__(self, *answers: str) -> None:
-        self.answers, self.asked = list(answers), []
-
-    def ask(self, request: Request) -> str:
-        self.asked.append(request.text)
-        return self.answers.pop(0)
-
-
-@pytest.mark.parametrize(("answer", "angle_deg"), [("", 30.0), ("done", 30.0), ("30.2", 30.2),
-                                                   ("29,9", 29.9), ("30.1°", 30.1)])  # fmt: skip
-def test_what_the_operator_says_was_set_is_what_counts(answer: str, angle_deg: float) -> None:
-    axis = HandSetAxis("theta_i", "the lamp's angle", Answers(answer), tolerance_deg=0.75)
-    axis.start_move(30.0)
-    assert axis.wait() == axis.position_deg() == angle_deg
-
-
-def test_an_angle_that_is_off_is_asked_for_again() -> None:
-    operator = Answers("35", "thirty", "30.5")
-    axis = HandSetAxis("theta_i", "the lamp's angle", operator, tolerance_deg=0.75)
-    axis.start_move(30.0)
-    assert axis.wait() == 30.5
-    assert "'35' is not within 0.75 degrees of 30" in operator.asked[1]
-    assert "'thirty' is not within 0.75 degrees of 30" in operator.asked[2]
 
 
 REAL_RIG = """

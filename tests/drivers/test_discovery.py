@@ -1,0 +1,40 @@
+"""Identification of the controllers on serial ports."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from drivers.discovery import identify_controller
+from instrument.clock import SystemClock
+from sim.emulated.motor import Mechanics, Motor
+from sim.emulated.newport_controller import NewportController
+from sim.emulated.wire import PtyWire
+from sim.emulated.zaber_controller import ZaberController
+
+pytestmark = pytest.mark.waits
+
+
+@pytest.mark.parametrize(
+    ("controller", "answer"),
+    [
+        (NewportController, r"'1VE SMC100.*' when asked as Newport SMC100"),
+        (ZaberController, r"'@01 0 OK IDLE .*' when asked as Zaber"),
+    ],
+)
+def test_the_first_answer_is_quoted(
+    controller: type[NewportController | ZaberController], answer: str
+) -> None:
+    with PtyWire([controller(Motor(Mechanics(), SystemClock()))]) as wire:
+        assert re.fullmatch(answer, identify_controller(wire.port))
+
+
+def test_a_silent_port_has_no_answer() -> None:
+    with PtyWire([]) as wire:
+        assert identify_controller(wire.port) == "no answer"
+
+
+def test_a_missing_port_is_reported(tmp_path: Path) -> None:
+    assert "cannot open" in identify_controller(str(tmp_path / "nowhere"))
