@@ -1,7 +1,7 @@
-"""What every camera promises: simulated, V4L2 over the emulated device, and a real one.
+"""Contract of every camera: simulated, V4L2 on the emulated device, and a real one.
 
-A real camera only with `--allow-motion --camera /dev/v4l/by-id/...`; it needs light that does not
-flicker, and gives 640 x 480 pixels of 8 bit.
+A real camera is tested only with `--allow-motion --camera /dev/v4l/by-id/...`. It needs light that
+does not flicker, and must offer 640 x 480 pixels of 8 bit.
 """
 
 from __future__ import annotations
@@ -52,17 +52,17 @@ def camera(
             yield real
 
 
-def test_it_says_who_it_is(camera: Camera) -> None:
+def test_identity_states_the_bit_depth(camera: Camera) -> None:
     assert "bit" in camera.identity()
 
 
-def test_an_exposure_that_is_set_is_that_of_the_frames(camera: Camera) -> None:
+def test_frames_have_the_exposure_that_was_set(camera: Camera) -> None:
     for exposure_s in EXPOSURES_S:
         assert camera.set_exposure_s(exposure_s) == pytest.approx(exposure_s)
         assert [f.exposure_s for f in camera.grab(3)] == pytest.approx([exposure_s] * 3)
 
 
-def test_an_exposure_out_of_range_is_refused_with_the_range(camera: Camera) -> None:
+def test_an_exposure_out_of_range_is_refused(camera: Camera) -> None:
     camera.set_exposure_s(0.002)
     for exposure_s in (0.0, -1.0, 1e6, float("nan")):
         with pytest.raises(DeviceError, match=r"exposure .* s asked for"):
@@ -70,7 +70,7 @@ def test_an_exposure_out_of_range_is_refused_with_the_range(camera: Camera) -> N
     assert camera.grab(1)[0].exposure_s == pytest.approx(0.002)
 
 
-def test_frames_are_pictures_of_counts_in_the_order_they_were_taken(camera: Camera) -> None:
+def test_frames_are_images_of_counts_in_order(camera: Camera) -> None:
     camera.set_exposure_s(0.001)
     frames = camera.grab(5)
     assert len(frames) == 5
@@ -80,7 +80,7 @@ def test_frames_are_pictures_of_counts_in_the_order_they_were_taken(camera: Came
     assert times == sorted(set(times))
 
 
-def test_a_frame_stays_as_it_was_when_others_are_taken(camera: Camera) -> None:
+def test_a_frame_is_unchanged_when_others_are_taken(camera: Camera) -> None:
     camera.set_exposure_s(0.001)
     first = camera.grab(1)[0]
     before = first.image.copy()

@@ -1,6 +1,7 @@
-"""What every stage promises: simulated, each driver over its emulated controller, a real one.
+"""Contract of every stage: simulated, each driver on its emulated controller, and a real one.
 
-A real stage only with `--allow-motion --stage-port PORT`; it then moves within 10 degrees of home.
+A real stage is tested only with `--allow-motion --stage-port PORT`; it then moves within 10 degrees
+of home.
 """
 
 from __future__ import annotations
@@ -50,8 +51,10 @@ def real(config: pytest.Config) -> Iterator[Stage]:
             axis = NewportAxis(driver="newport", port=port, **KEYS)
         case "zaber":
             axis = ZaberAxis(driver="zaber", port=port, microsteps_per_deg=scale, **KEYS)
-        case _:
+        case "oriental":
             axis = OrientalAxis(driver="oriental", port=port, steps_per_deg=scale, **KEYS)
+        case other:
+            pytest.fail(f"--stage-driver {other}: no such driver")
     with Lines(SystemClock()) as lines:
         stage = open_stage("stage", axis, port, lines)
         try:
@@ -71,26 +74,26 @@ def stage(request: pytest.FixtureRequest) -> Iterator[Stage]:
         with real(request.config) as stage:
             yield stage
     else:
-        with EMULATED_STAGES[request.param]() as bench:
-            yield bench.stage
+        with EMULATED_STAGES[request.param]() as emulated:
+            yield emulated.stage
 
 
-def test_it_says_who_it_is(stage: Stage) -> None:
+def test_identity_is_stable(stage: Stage) -> None:
     assert len(stage.identity()) > 10
     assert stage.identity() == stage.identity()
 
 
-def test_its_limits_are_in_order(stage: Stage) -> None:
+def test_limits_are_in_order(stage: Stage) -> None:
     low, high = stage.limits_deg()
     assert low < 0 < high
 
 
-def test_after_homing_it_knows_where_it_is(stage: Stage) -> None:
+def test_homing_ends_at_home(stage: Stage) -> None:
     stage.home()
     assert stage.position_deg() == pytest.approx(0.0, abs=TOLERANCE_DEG)
 
 
-def test_it_goes_where_it_is_told_and_says_so(stage: Stage) -> None:
+def test_moves_end_at_their_targets(stage: Stage) -> None:
     stage.home()
     for angle_deg in (2.0, -3.0, -3.0, 9.5, 9.51, 0.0):
         stage.start_move(angle_deg)
@@ -98,7 +101,7 @@ def test_it_goes_where_it_is_told_and_says_so(stage: Stage) -> None:
         assert stage.position_deg() == pytest.approx(angle_deg, abs=TOLERANCE_DEG)
 
 
-def test_past_a_limit_it_refuses_and_stays(stage: Stage) -> None:
+def test_a_move_past_a_limit_is_refused(stage: Stage) -> None:
     stage.home()
     low, high = stage.limits_deg()
     here = stage.position_deg()
@@ -108,7 +111,7 @@ def test_past_a_limit_it_refuses_and_stays(stage: Stage) -> None:
     assert stage.position_deg() == pytest.approx(here, abs=1e-6)
 
 
-def test_a_stop_is_no_harm_at_any_time(stage: Stage) -> None:
+def test_a_stop_is_allowed_at_any_time(stage: Stage) -> None:
     stage.stop()
     stage.stop()
     stage.home()
@@ -119,7 +122,7 @@ def test_a_stop_is_no_harm_at_any_time(stage: Stage) -> None:
     assert stage.position_deg() == pytest.approx(5.0, abs=TOLERANCE_DEG)
 
 
-def test_a_stop_ends_a_move_short_of_its_end(stage: Stage) -> None:
+def test_a_stop_ends_a_move_before_its_target(stage: Stage) -> None:
     stage.home()
     stage.start_move(9.0)
     stage.stop()
@@ -128,15 +131,15 @@ def test_a_stop_ends_a_move_short_of_its_end(stage: Stage) -> None:
     except DeviceError:
         where = stage.position_deg()
     assert where < 9.0
-    stage.start_move(1.0)  # and it may be told to go on
+    stage.start_move(1.0)  # the next move is possible
     assert stage.wait() == pytest.approx(1.0, abs=TOLERANCE_DEG)
 
 
-def test_waiting_without_a_move_says_where_it_stands(stage: Stage) -> None:
+def test_waiting_without_a_move_returns_the_position(stage: Stage) -> None:
     stage.home()
     assert stage.wait() == pytest.approx(0.0, abs=TOLERANCE_DEG)
 
 
-def test_closing_twice_is_no_harm(stage: Stage) -> None:
+def test_closing_twice_is_allowed(stage: Stage) -> None:
     stage.close()
     stage.close()

@@ -1,4 +1,4 @@
-"""A stop reaches the wire within 100 ms: Ctrl-C, SIGTERM, or a failure of the scan's own."""
+"""A stop is on the wire within 100 ms after Ctrl-C, SIGTERM or a failure of the scan itself."""
 
 from __future__ import annotations
 
@@ -10,23 +10,21 @@ import pytest
 from tests.support.paths import ROOT
 from tests.support.stages.emulated_stages import EMULATED_STAGES
 
-# A half-duplex line may still owe an answer: then one reply time-out more.
+# On a half-duplex line a reply may be pending: one reply time-out more.
 BOUND_S = {"newport": 0.1, "zaber": 0.1, "oriental rtu": 0.3, "oriental tcp": 0.3}
+CAUSES = {"SIGINT": "KeyboardInterrupt", "SIGTERM": "KeyboardInterrupt", "exception": "DeviceError"}
 
 
-HOWS = {"SIGINT": "KeyboardInterrupt", "SIGTERM": "KeyboardInterrupt", "exception": "DeviceError"}
-
-
-@pytest.mark.parametrize("bench", list(EMULATED_STAGES))
-def test_a_stop_is_on_the_wire_in_time(bench: str) -> None:
+@pytest.mark.parametrize("emulated", list(EMULATED_STAGES))
+def test_a_stop_is_on_the_wire_in_time(emulated: str) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "tests.support.stages.stop_child", bench, *HOWS],
+        [sys.executable, "-m", "tests.support.stages.stop_child", emulated, *CAUSES],
         capture_output=True, text=True, timeout=60, check=False, cwd=ROOT,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert lines[::2] == list(HOWS.values())
-    for how, figures in zip(HOWS, lines[1::2], strict=True):
+    assert lines[::2] == list(CAUSES.values())
+    for cause, figures in zip(CAUSES, lines[1::2], strict=True):
         seconds, moving = figures.split()
-        assert 0 <= float(seconds) < BOUND_S[bench], how
-        assert moving == "False", how
+        assert 0 <= float(seconds) < BOUND_S[emulated], cause
+        assert moving == "False", cause

@@ -49,104 +49,104 @@ TARGET = 8.0
 T = TypeVar("T")
 
 
-def _moved(at: EmulatedDrive, stage: OrientalStage) -> float:
+def _moved(az: EmulatedDrive, stage: OrientalStage) -> float:
     stage.start_move(TARGET)
     return stage.wait()
 
 
 @pytest.fixture(params=WIRES)
-def at(request: pytest.FixtureRequest) -> Iterator[EmulatedDrive]:
+def az(request: pytest.FixtureRequest) -> Iterator[EmulatedDrive]:
     with emulated_drive(request.param, reply_s=0.1) as made:
         yield made
 
 
 @pytest.mark.parametrize(("kind", "after"), [("pty", 0), ("tcp", 2)])
 @pytest.mark.parametrize("fault", FAULTS)
-def test_opening(kind: str, fault: str, after: int) -> None:
-    with emulated_drive(kind, reply_s=REPLY_S) as at:
-        at.wire.inject(*[None] * after, FAULTS[fault])
-        told = _outcome(fault, lambda: at.open().opening_report)
+def test_fault_while_opening(kind: str, fault: str, after: int) -> None:
+    with emulated_drive(kind, reply_s=REPLY_S) as az:
+        az.wire.inject(*[None] * after, FAULTS[fault])
+        told = _outcome(fault, lambda: az.open().opening_report)
         assert told is None or "output 4020 hex, no alarm" in told
-        assert at.wire.pending == 0
+        assert az.wire.pending == 0
 
 
 @pytest.mark.parametrize(("kind", "after"), [("pty", 0), ("tcp", 1)])
 @pytest.mark.parametrize("fault", FAULTS)
-def test_reading_the_status(kind: str, fault: str, after: int) -> None:
-    with emulated_drive(kind, reply_s=REPLY_S) as at:
-        stage = at.homed()
-        at.motor.move(TARGET)
-        wait_until(lambda: not at.motor.moving)
-        at.wire.inject(*[None] * after, FAULTS[fault])
+def test_fault_while_reading_the_status(kind: str, fault: str, after: int) -> None:
+    with emulated_drive(kind, reply_s=REPLY_S) as az:
+        stage = az.homed()
+        az.motor.move(TARGET)
+        wait_until(lambda: not az.motor.moving)
+        az.wire.inject(*[None] * after, FAULTS[fault])
         for _ in range(3):
             assert _outcome(fault, stage.position_deg) in (TARGET, None)
-        assert at.wire.pending == 0
+        assert az.wire.pending == 0
 
 
 @pytest.mark.parametrize(("kind", "again"), [("pty", False), ("pty", True), ("tcp", False)])
 @pytest.mark.parametrize("fault", FAULTS)
-def test_writing_a_move(kind: str, fault: str, again: bool) -> None:
-    with emulated_drive(kind, reply_s=REPLY_S) as at:
-        stage, moves = at.homed(), 1
+def test_fault_while_writing_a_move(kind: str, fault: str, again: bool) -> None:
+    with emulated_drive(kind, reply_s=REPLY_S) as az:
+        stage, moves = az.homed(), 1
         if again:  # the drive holds the same target already, and stands elsewhere
-            assert _moved(at, stage) == TARGET
-            at.motor.move(0.0)
-            wait_until(lambda: not at.motor.moving)
+            assert _moved(az, stage) == TARGET
+            az.motor.move(0.0)
+            wait_until(lambda: not az.motor.moving)
             moves = 2
-        since = len(at.wire.seen)
-        at.wire.inject(None, None, None, FAULTS[fault])  # after status, position and READY
-        assert _outcome(fault, lambda: _moved(at, stage)) in (TARGET, None)
-        assert at.wire.pending == 0
-        assert b"\x10\x00\x58" in at.wire.seen[since + 3][1]  # it was the move that was hit
-        assert at.drive.triggers == moves
-        sent = len(at.sent(b"\x10\x00\x58", since))
+        since = len(az.wire.seen)
+        az.wire.inject(None, None, None, FAULTS[fault])  # after status, position and READY
+        assert _outcome(fault, lambda: _moved(az, stage)) in (TARGET, None)
+        assert az.wire.pending == 0
+        assert b"\x10\x00\x58" in az.wire.seen[since + 3][1]  # it was the move that was hit
+        assert az.drive.triggers == moves
+        sent = len(az.sent(b"\x10\x00\x58", since))
         assert sent == (2 if fault == "lose request" else 1)
 
 
 @pytest.mark.parametrize("kind", WIRES)
 @pytest.mark.parametrize("fault", FAULTS)
-def test_waiting(kind: str, fault: str) -> None:
-    with emulated_drive(kind, reply_s=REPLY_S) as at:
-        stage = at.homed()
+def test_fault_while_waiting(kind: str, fault: str) -> None:
+    with emulated_drive(kind, reply_s=REPLY_S) as az:
+        stage = az.homed()
         stage.start_move(TARGET)
-        at.wire.inject(None, FAULTS[fault])
+        az.wire.inject(None, FAULTS[fault])
         assert _outcome(fault, stage.wait) in (TARGET, None)
-        assert at.wire.pending == 0
-        assert at.drive.triggers == 1
+        assert az.wire.pending == 0
+        assert az.drive.triggers == 1
 
 
 @pytest.mark.parametrize("kind", ["pty"])
 @pytest.mark.parametrize("fault", FAULTS)
-def test_homing(kind: str, fault: str) -> None:
-    with emulated_drive(kind, reply_s=REPLY_S) as at:
-        stage = at.open()
-        since = len(at.wire.seen)
-        at.wire.inject(None, None, None, None, FAULTS[fault])  # after the input word and READY
+def test_fault_while_homing(kind: str, fault: str) -> None:
+    with emulated_drive(kind, reply_s=REPLY_S) as az:
+        stage = az.open()
+        since = len(az.wire.seen)
+        az.wire.inject(None, None, None, None, FAULTS[fault])  # after the input word and READY
         _outcome(fault, stage.home)
-        assert b"\x10\x00\x7d" in at.wire.seen[since + 4][1]
-        assert at.drive.homings == 1
+        assert b"\x10\x00\x7d" in az.wire.seen[since + 4][1]
+        assert az.drive.homings == 1
         if fault != "unplug":
             assert stage.position_deg() == 0.0
-            assert at.motor.referenced
+            assert az.motor.referenced
 
 
 @pytest.mark.parametrize(
     ("kind", "fault"),
     [("pty", name) for name in FAULTS] + [("tcp", name) for name in ("late", "nul", "unplug")],
 )
-def test_stopping(kind: str, fault: str) -> None:
-    with emulated_drive(kind, reply_s=2 * REPLY_S) as at:
-        stage = at.homed()
-        at.motor.move(-170.0)
-        at.wire.inject(replace(FAULTS[fault], seconds=2 * FAULTS[fault].seconds))
+def test_fault_while_stopping(kind: str, fault: str) -> None:
+    with emulated_drive(kind, reply_s=2 * REPLY_S) as az:
+        stage = az.homed()
+        az.motor.move(-170.0)
+        az.wire.inject(replace(FAULTS[fault], seconds=2 * FAULTS[fault].seconds))
         if fault == "much later":  # than all three tries
             with pytest.raises(NoReply, match="not acknowledged: it may still move"):
                 stage.stop()
         else:
             _outcome(fault, stage.stop)
-        assert not at.motor.moving
+        assert not az.motor.moving
         if fault != "unplug":
-            here = at.motor.position_deg
+            here = az.motor.position_deg
             assert stage.position_deg() == pytest.approx(here, abs=0.005)
 
 
@@ -154,29 +154,29 @@ def test_stopping(kind: str, fault: str) -> None:
 @pytest.mark.parametrize("first", ["late", "truncate", "lose request"])
 @pytest.mark.parametrize("second", ["drop", "later than the quiet"])
 def test_two_faults_in_a_row_at_a_move(kind: str, first: str, second: str) -> None:
-    with emulated_drive(kind, reply_s=REPLY_S) as at:
-        stage = at.homed()
-        at.wire.inject(None, None, None, FAULTS[first], FAULTS[second])
-        assert _outcome("", lambda: _moved(at, stage)) == TARGET
-        assert at.drive.triggers == 1
+    with emulated_drive(kind, reply_s=REPLY_S) as az:
+        stage = az.homed()
+        az.wire.inject(None, None, None, FAULTS[first], FAULTS[second])
+        assert _outcome("", lambda: _moved(az, stage)) == TARGET
+        assert az.drive.triggers == 1
 
 
 def test_after_a_line_dies_during_a_move_command_the_error_warns_of_motion() -> None:
-    with emulated_drive("pty") as at:
-        stage = at.homed()
-        at.wire.inject(None, None, None, *[Fault("drop")] * 9)
+    with emulated_drive("pty") as az:
+        stage = az.homed()
+        az.wire.inject(None, None, None, *[Fault("drop")] * 9)
         begun_s = time.monotonic()
         with pytest.raises(DeviceError, match=r"no answer within 0.25 s.*not known: it may move"):
             stage.start_move(TARGET)
         assert time.monotonic() - begun_s < 2.0
-        assert at.drive.triggers == 1
+        assert az.drive.triggers == 1
 
 
 def test_a_stop_forbids_the_second_try_of_a_lost_move() -> None:
-    with emulated_drive("pty") as at:
-        stage, told = at.homed(), []
-        since = len(at.wire.seen)
-        at.wire.inject(None, None, None, Fault("lose request"))
+    with emulated_drive("pty") as az:
+        stage, told = az.homed(), []
+        since = len(az.wire.seen)
+        az.wire.inject(None, None, None, Fault("lose request"))
 
         def move() -> None:
             with pytest.raises(Stopped, match="stopped before it began to move"):
@@ -185,27 +185,27 @@ def test_a_stop_forbids_the_second_try_of_a_lost_move() -> None:
 
         moving = threading.Thread(target=move)
         moving.start()
-        wait_until(lambda: len(at.sent(b"\x10\x00\x58", since)) == 1)
+        wait_until(lambda: len(az.sent(b"\x10\x00\x58", since)) == 1)
         stage.stop()
         moving.join(timeout=5)
         assert told == ["stopped"]
-        assert at.drive.triggers == 0
+        assert az.drive.triggers == 0
 
 
 @pytest.mark.parametrize("late", [1.5, 2.4, 4.0])
 def test_a_late_answer_is_never_taken_for_another(late: float) -> None:
     """Command and feedback position have the same form; only waiting separates their answers."""
-    with emulated_drive("pty", SLOW, SLOW_LIMITS) as at:
-        stage = at.homed()
+    with emulated_drive("pty", SLOW, SLOW_LIMITS) as az:
+        stage = az.homed()
         stage.start_move(90.0)
-        at.motor.hold()
-        held = round(at.motor.position_deg * STEPS_PER_DEG)
+        az.motor.hold()
+        held = round(az.motor.position_deg * STEPS_PER_DEG)
         stage.close()
         with ModbusBus(
-            "line", BusSettings(at.port, parity="N", reply_s=REPLY_S), SystemClock()
+            "line", BusSettings(az.port, parity="N", reply_s=REPLY_S), SystemClock()
         ) as bus:
             unit = ModbusUnit(bus, "line", 1, 0x58, (6, 8, 10, 12, 14))
-            at.wire.inject(None, Fault("late", late * REPLY_S))
+            az.wire.inject(None, Fault("late", late * REPLY_S))
             for _ in range(3):
                 assert value_of(unit.read(0xC6, 2)) == 9000
                 assert value_of(unit.read(0xCC, 2)) == held
@@ -225,8 +225,8 @@ def test_a_parity_that_the_port_refuses_is_named() -> None:
         OrientalStage("theta_r", az_settings(wire.port, parity="X"), SystemClock())
 
 
-def test_a_closed_line_stays_closed(at: EmulatedDrive) -> None:
-    stage = at.homed()
+def test_a_closed_line_stays_closed(az: EmulatedDrive) -> None:
+    stage = az.homed()
     stage.close()
     stage.close()
     for action in (stage.status, stage.stop):
@@ -235,9 +235,9 @@ def test_a_closed_line_stays_closed(at: EmulatedDrive) -> None:
 
 
 def test_a_gateway_that_has_hung_up_is_reconnected() -> None:
-    with emulated_drive("tcp") as at:
-        stage = at.homed()
-        peer = at.wire._peer  # type: ignore[union-attr]  # a TcpWire's
+    with emulated_drive("tcp") as az:
+        stage = az.homed()
+        peer = az.wire._peer  # type: ignore[union-attr]  # a TcpWire's
         assert peer is not None
         peer.shutdown(2)
         assert stage.position_deg() == 0.0

@@ -1,8 +1,8 @@
-"""Foreign Modbus: other masters ask our emulated drive, and our line asks other slaves.
+"""Modbus line and emulated drive against independent Modbus masters and slaves.
 
-A mistake that driver and emulated drive had in common would show here. Each peer is skipped where
-it is not installed: minimalmodbus, modbus_tk and pyModbusTCP from PyPI, mbpoll and libmodbus-dev
-from Debian.
+An error common to driver and emulated drive would show here. Each test is skipped if its peer is
+not installed: minimalmodbus, modbus_tk and pyModbusTCP from PyPI, mbpoll and libmodbus-dev from
+Debian.
 """
 
 from __future__ import annotations
@@ -107,8 +107,8 @@ def _mbpoll(wire: PtyWire | TcpWire, register: int, *values: str, count: int) ->
     return [int(value) for value in re.findall(r"^\[\d+\]:\s+(\d+)", done.stdout, re.MULTILINE)]
 
 
-def _our_line_asks(port: str) -> None:
-    """Read, write in both ways and read back, and take a refusal as one."""
+def _exercise_line(port: str) -> None:
+    """Read, write in both ways, read back, and recognise a refusal."""
     settings = BusSettings(port, parity="N", reply_s=0.4)
     with ModbusBus("peer", settings, SystemClock()) as bus:
         unit = ModbusUnit(bus, "peer", 1, DIRECT_DATA, (6, 8, 10))
@@ -123,12 +123,12 @@ def _our_line_asks(port: str) -> None:
         unit.write(0xFF, [1], unit.deadline_s())
 
 
-def test_our_line_asks_a_libmodbus_slave(tmp_path: Path) -> None:
+def test_our_line_with_a_slave_of_libmodbus(tmp_path: Path) -> None:
     slave = _compiled(tmp_path)
-    with _two_ended() as (theirs, ours):
+    with _joined_ports() as (theirs, ours):
         running = subprocess.Popen([slave, theirs, "1"])
         try:
-            _our_line_asks(ours)
+            _exercise_line(ours)
             assert running.wait(timeout=5) == 0
         finally:
             running.kill()
@@ -153,8 +153,8 @@ def _compiled(folder: Path) -> Path:
 
 
 @contextmanager
-def _two_ended() -> Iterator[tuple[str, str]]:
-    """A serial line with a port at both ends: two pseudo-terminals, their masters joined."""
+def _joined_ports() -> Iterator[tuple[str, str]]:
+    """Both ends of a serial line: two pseudo-terminals with their masters joined."""
     ends, ports = [], []
     for _ in range(2):
         master, slave = os.openpty()
@@ -181,24 +181,24 @@ def _two_ended() -> Iterator[tuple[str, str]]:
 
 
 @pytest.mark.filterwarnings("ignore:isSet:DeprecationWarning")  # modbus_tk's own
-def test_our_line_asks_a_modbus_tk_slave() -> None:
+def test_our_line_with_a_slave_of_modbus_tk() -> None:
     pytest.importorskip("modbus_tk")
     import serial
     from modbus_tk import defines, modbus_rtu
 
-    with _two_ended() as (theirs, ours):
+    with _joined_ports() as (theirs, ours):
         server = modbus_rtu.RtuServer(serial.Serial(theirs, 115200, timeout=0.02))
         slave = server.add_slave(1)
         slave.add_block("all", defines.HOLDING_REGISTERS, 0, 256)
         slave.set_values("all", 0xCD, 8500)
         server.start()
         try:
-            _our_line_asks(ours)
+            _exercise_line(ours)
         finally:
             server.stop()
 
 
-def test_our_line_asks_a_pymodbustcp_slave() -> None:
+def test_our_line_with_a_slave_of_pymodbustcp() -> None:
     pytest.importorskip("pyModbusTCP")
     from pyModbusTCP.server import DataBank, ModbusServer
 
@@ -209,13 +209,13 @@ def test_our_line_asks_a_pymodbustcp_slave() -> None:
     server = ModbusServer("127.0.0.1", port, no_block=True, data_bank=bank)
     server.start()
     try:
-        _our_line_asks(f"tcp://127.0.0.1:{port}")
+        _exercise_line(f"tcp://127.0.0.1:{port}")
     finally:
         server.stop()
 
 
 def test_a_foreign_slave_is_no_az_drive(tmp_path: Path) -> None:
-    with _two_ended() as (theirs, ours):
+    with _joined_ports() as (theirs, ours):
         running = subprocess.Popen([_compiled(tmp_path), theirs, "1"])
         settings = az_settings(ours)
         try:

@@ -49,26 +49,26 @@ SERIAL = [name for name in EMULATED_STAGES if name != "oriental tcp"]
 
 
 @pytest.fixture(params=SERIAL)
-def bench(request: pytest.FixtureRequest) -> Iterator[EmulatedStage]:
-    with EMULATED_STAGES[request.param](MECHANICS) as bench:
-        bench.stage.home()
-        bench.stage.start_move(10.0)
-        bench.stage.wait()
-        yield bench
+def emulated(request: pytest.FixtureRequest) -> Iterator[EmulatedStage]:
+    with EMULATED_STAGES[request.param](MECHANICS) as emulated:
+        emulated.stage.home()
+        emulated.stage.start_move(10.0)
+        emulated.stage.wait()
+        yield emulated
 
 
-def read(bench: EmulatedStage) -> float:
-    return bench.stage.position_deg()
+def read(emulated: EmulatedStage) -> float:
+    return emulated.stage.position_deg()
 
 
-def move(bench: EmulatedStage) -> float:
-    bench.stage.start_move(-40.0)
-    return bench.stage.wait()
+def move(emulated: EmulatedStage) -> float:
+    emulated.stage.start_move(-40.0)
+    return emulated.stage.wait()
 
 
-def home(bench: EmulatedStage) -> float:
-    bench.stage.home()
-    return bench.stage.position_deg()
+def home(emulated: EmulatedStage) -> float:
+    emulated.stage.home()
+    return emulated.stage.position_deg()
 
 
 ACTIONS: dict[str, tuple[Callable[[EmulatedStage], float], float]] = {
@@ -82,72 +82,72 @@ ACTIONS: dict[str, tuple[Callable[[EmulatedStage], float], float]] = {
 @pytest.mark.parametrize("fault", ONCE)
 @pytest.mark.parametrize("action", ACTIONS)
 def test_one_spoilt_answer_is_recovered_from(
-    bench: EmulatedStage, action: str, fault: str, answer: int
+    emulated: EmulatedStage, action: str, fault: str, answer: int
 ) -> None:
     """The spoilt answer may be that to the status, to the command, or to the query after it."""
     act, expected = ACTIONS[action]
-    moves = bench.moves()
-    bench.wire.inject(*[None] * answer, ONCE[fault])
+    moves = emulated.moves()
+    emulated.wire.inject(*[None] * answer, ONCE[fault])
     begun_s = time.monotonic()
-    assert act(bench) == pytest.approx(expected, abs=1e-3)
-    assert bench.motor.position_deg == pytest.approx(expected, abs=1e-3)
+    assert act(emulated) == pytest.approx(expected, abs=1e-3)
+    assert emulated.motor.position_deg == pytest.approx(expected, abs=1e-3)
     assert time.monotonic() - begun_s < BOUND_S
-    assert bench.moves() - moves <= 1
+    assert emulated.moves() - moves <= 1
 
 
 @pytest.mark.parametrize("fault", FOR_GOOD)
 @pytest.mark.parametrize("action", ACTIONS)
 def test_a_line_that_stays_bad_is_an_error_in_time(
-    bench: EmulatedStage, action: str, fault: str
+    emulated: EmulatedStage, action: str, fault: str
 ) -> None:
     act, _ = ACTIONS[action]
     spoilt, error = FOR_GOOD[fault]
-    moves = bench.moves()
-    bench.wire.inject(*[spoilt] * 200)
+    moves = emulated.moves()
+    emulated.wire.inject(*[spoilt] * 200)
     begun_s = time.monotonic()
     with pytest.raises(error, match="theta_r") as failed:
-        act(bench)
+        act(emulated)
     assert time.monotonic() - begun_s < BOUND_S
-    assert str(bench.wire.port) in str(failed.value)
+    assert str(emulated.wire.port) in str(failed.value)
     assert "look at" in str(failed.value)
-    assert bench.moves() - moves <= 1
+    assert emulated.moves() - moves <= 1
 
 
 @pytest.mark.parametrize("answer", range(4))
 def test_a_line_that_goes_bad_during_a_move_ends_it_in_time(
-    bench: EmulatedStage, answer: int
+    emulated: EmulatedStage, answer: int
 ) -> None:
-    bench.wire.inject(*[None] * answer, *[Fault("drop")] * 200)
+    emulated.wire.inject(*[None] * answer, *[Fault("drop")] * 200)
     begun_s = time.monotonic()
     with pytest.raises(NoReply, match="theta_r"):
-        move(bench)
+        move(emulated)
     assert time.monotonic() - begun_s < BOUND_S
 
 
-def test_a_late_answer_is_never_taken_for_another(bench: EmulatedStage) -> None:
+def test_a_late_answer_is_never_taken_for_another(emulated: EmulatedStage) -> None:
     """Position asked while it comes late, then moved, then asked again, over and over."""
     for angle_deg in (20.0, -20.0, 30.0):
-        bench.wire.inject(Fault("late", 0.4))
-        bench.stage.position_deg()
-        bench.stage.start_move(angle_deg)
-        assert bench.stage.wait() == pytest.approx(angle_deg, abs=1e-3)
-        assert bench.stage.position_deg() == pytest.approx(angle_deg, abs=1e-3)
+        emulated.wire.inject(Fault("late", 0.4))
+        emulated.stage.position_deg()
+        emulated.stage.start_move(angle_deg)
+        assert emulated.stage.wait() == pytest.approx(angle_deg, abs=1e-3)
+        assert emulated.stage.position_deg() == pytest.approx(angle_deg, abs=1e-3)
 
 
 def test_a_stop_is_sent_while_a_reply_is_pending() -> None:
     for make in EMULATED_STAGES.values():
-        with make(SLOW) as bench:
-            bench.stage.home()
-            bench.stage.start_move(70.0)
-            bench.wire.inject(Fault("drop"), Fault("drop"))
-            asking = threading.Thread(target=_ask, args=(bench,))
-            sent = len(bench.wire.seen)
+        with make(SLOW) as emulated:
+            emulated.stage.home()
+            emulated.stage.start_move(70.0)
+            emulated.wire.inject(Fault("drop"), Fault("drop"))
+            asking = threading.Thread(target=_ask, args=(emulated,))
+            sent = len(emulated.wire.seen)
             asking.start()
-            while len(bench.wire.seen) == sent:
+            while len(emulated.wire.seen) == sent:
                 time.sleep(0.001)  # until the question is out; it is never answered
-            sent, begun_s = len(bench.wire.seen), time.monotonic()
-            bench.stage.stop()
-            while bench.motor.moving:
+            sent, begun_s = len(emulated.wire.seen), time.monotonic()
+            emulated.stage.stop()
+            while emulated.motor.moving:
                 assert time.monotonic() - begun_s < 0.3
                 time.sleep(0.001)
             asking.join(BOUND_S)
@@ -158,8 +158,8 @@ def test_a_missing_port_is_named_with_advice(tmp_path: Path) -> None:
         Line("theta_r", str(tmp_path / "nowhere"), 57600, SystemClock())
 
 
-def _ask(bench: EmulatedStage) -> None:
+def _ask(emulated: EmulatedStage) -> None:
     try:
-        bench.stage.position_deg()
+        emulated.stage.position_deg()
     except DeviceError:
         return

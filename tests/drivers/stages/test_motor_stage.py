@@ -31,140 +31,140 @@ def make(request: pytest.FixtureRequest) -> Callable[..., AbstractContextManager
 
 
 @pytest.fixture
-def bench(make: Callable[..., AbstractContextManager[EmulatedStage]]) -> Iterator[EmulatedStage]:
-    with make(MECHANICS) as bench:
-        yield bench
+def emulated(make: Callable[..., AbstractContextManager[EmulatedStage]]) -> Iterator[EmulatedStage]:
+    with make(MECHANICS) as emulated:
+        yield emulated
 
 
-def test_identity_names_the_maker_and_not_the_port(bench: EmulatedStage) -> None:
-    assert any(maker in bench.stage.identity() for maker in ("SMC100", "Zaber", "AZ"))
+def test_identity_names_the_maker_and_not_the_port(emulated: EmulatedStage) -> None:
+    assert any(maker in emulated.stage.identity() for maker in ("SMC100", "Zaber", "AZ"))
     # The port is none of it: a plug may move to another.
-    assert str(bench.wire.port) not in bench.stage.identity()
+    assert str(emulated.wire.port) not in emulated.stage.identity()
 
 
-def test_nothing_moves_before_homing(bench: EmulatedStage) -> None:
+def test_nothing_moves_before_homing(emulated: EmulatedStage) -> None:
     with pytest.raises(DeviceError, match=r"theta_r.*not homed.*home it first"):
-        bench.stage.start_move(10.0)
-    assert bench.moves() == 0
+        emulated.stage.start_move(10.0)
+    assert emulated.moves() == 0
 
 
-def test_nothing_is_sent_for_a_move_past_the_narrower_limit(bench: EmulatedStage) -> None:
-    bench.stage.home()
-    assert bench.stage.limits_deg() == pytest.approx((-90.0, bench.max_deg), abs=1e-3)
-    sent = len(bench.wire.seen)
-    for angle_deg in (bench.max_deg + 0.001, 1e6, -90.001, float("nan"), float("inf")):
+def test_nothing_is_sent_for_a_move_past_the_narrower_limit(emulated: EmulatedStage) -> None:
+    emulated.stage.home()
+    assert emulated.stage.limits_deg() == pytest.approx((-90.0, emulated.max_deg), abs=1e-3)
+    sent = len(emulated.wire.seen)
+    for angle_deg in (emulated.max_deg + 0.001, 1e6, -90.001, float("nan"), float("inf")):
         with pytest.raises(DeviceError, match=r"theta_r: .* deg asked for; its limits are -90 to"):
-            bench.stage.start_move(angle_deg)
-    assert len(bench.wire.seen) == sent
+            emulated.stage.start_move(angle_deg)
+    assert len(emulated.wire.seen) == sent
 
 
-def test_moves_end_at_their_targets(bench: EmulatedStage) -> None:
-    bench.stage.home()
-    assert bench.stage.position_deg() == pytest.approx(0.0, abs=1e-3)
+def test_moves_end_at_their_targets(emulated: EmulatedStage) -> None:
+    emulated.stage.home()
+    assert emulated.stage.position_deg() == pytest.approx(0.0, abs=1e-3)
     for angle_deg in (10.0, -90.0, 79.9, 79.9, 79.901, 0.0):
-        bench.stage.start_move(angle_deg)
-        assert bench.stage.wait() == pytest.approx(angle_deg, abs=1e-3)
-        assert bench.motor.position_deg == pytest.approx(angle_deg, abs=1e-3)
+        emulated.stage.start_move(angle_deg)
+        assert emulated.stage.wait() == pytest.approx(angle_deg, abs=1e-3)
+        assert emulated.motor.position_deg == pytest.approx(angle_deg, abs=1e-3)
 
 
 def test_start_move_returns_at_once_and_wait_at_the_end(
     make: Callable[..., AbstractContextManager[EmulatedStage]],
 ) -> None:
-    with make(SLOW) as bench:
-        bench.stage.home()
+    with make(SLOW) as emulated:
+        emulated.stage.home()
         begun_s = time.monotonic()
-        bench.stage.start_move(5.0)
+        emulated.stage.start_move(5.0)
         assert time.monotonic() - begun_s < 0.1
-        assert 0 <= bench.stage.position_deg() < 5.0
-        assert bench.stage.wait() == pytest.approx(5.0, abs=1e-3)
+        assert 0 <= emulated.stage.position_deg() < 5.0
+        assert emulated.stage.wait() == pytest.approx(5.0, abs=1e-3)
         assert time.monotonic() - begun_s > 0.2  # 5 degrees at 20 deg/s
 
 
-def test_homing_twice_is_allowed(bench: EmulatedStage) -> None:
-    bench.stage.home()
-    bench.stage.start_move(20.0)
-    bench.stage.wait()
-    bench.stage.home()
-    assert bench.stage.position_deg() == pytest.approx(0.0, abs=1e-3)
+def test_homing_twice_is_allowed(emulated: EmulatedStage) -> None:
+    emulated.stage.home()
+    emulated.stage.start_move(20.0)
+    emulated.stage.wait()
+    emulated.stage.home()
+    assert emulated.stage.position_deg() == pytest.approx(0.0, abs=1e-3)
 
 
 def test_a_stop_from_another_thread_ends_the_move(
     make: Callable[..., AbstractContextManager[EmulatedStage]],
 ) -> None:
-    with make(SLOW) as bench:
-        bench.stage.home()
-        bench.stage.start_move(70.0)
-        wait_until(lambda: bench.motor.position_deg > 1.0)
-        stopper = threading.Timer(0.05, bench.stage.stop)
+    with make(SLOW) as emulated:
+        emulated.stage.home()
+        emulated.stage.start_move(70.0)
+        wait_until(lambda: emulated.motor.position_deg > 1.0)
+        stopper = threading.Timer(0.05, emulated.stage.stop)
         stopper.start()
         with pytest.raises(Stopped, match=r"theta_r: stopped at [\d.]+ deg"):
-            bench.stage.wait()
+            emulated.stage.wait()
         stopper.join()
-        wait_until(lambda: not bench.motor.moving)  # on the wire is not yet read
-        assert 1.0 < bench.motor.position_deg < 60.0
-        bench.stage.stop()
-        bench.stage.start_move(0.0)  # and it may be told to go on
-        assert bench.stage.wait() == pytest.approx(0.0, abs=1e-3)
+        wait_until(lambda: not emulated.motor.moving)  # on the wire is not yet read
+        assert 1.0 < emulated.motor.position_deg < 60.0
+        emulated.stage.stop()
+        emulated.stage.start_move(0.0)  # and it may be told to go on
+        assert emulated.stage.wait() == pytest.approx(0.0, abs=1e-3)
 
 
-def test_stopping_a_stage_at_rest_is_allowed(bench: EmulatedStage) -> None:
-    bench.stage.stop()
-    bench.stage.home()
-    bench.stage.stop()
-    bench.stage.stop()
-    bench.stage.start_move(3.0)
-    assert bench.stage.wait() == pytest.approx(3.0, abs=1e-3)
+def test_stopping_a_stage_at_rest_is_allowed(emulated: EmulatedStage) -> None:
+    emulated.stage.stop()
+    emulated.stage.home()
+    emulated.stage.stop()
+    emulated.stage.stop()
+    emulated.stage.start_move(3.0)
+    assert emulated.stage.wait() == pytest.approx(3.0, abs=1e-3)
 
 
 def test_a_stop_is_sent_at_once(
     make: Callable[..., AbstractContextManager[EmulatedStage]],
 ) -> None:
-    with make(SLOW) as bench:
-        bench.stage.home()
-        bench.stage.start_move(70.0)
-        sent, asked_s = len(bench.wire.seen), time.monotonic()
-        bench.stage.stop()
-        wait_until(lambda: len(bench.wire.seen) > sent)
-        assert bench.wire.seen[sent][0] - asked_s < 0.1
-        wait_until(lambda: not bench.motor.moving)
+    with make(SLOW) as emulated:
+        emulated.stage.home()
+        emulated.stage.start_move(70.0)
+        sent, asked_s = len(emulated.wire.seen), time.monotonic()
+        emulated.stage.stop()
+        wait_until(lambda: len(emulated.wire.seen) > sent)
+        assert emulated.wire.seen[sent][0] - asked_s < 0.1
+        wait_until(lambda: not emulated.motor.moving)
 
 
 def test_a_blocked_stage_is_reported_as_stalled(
     make: Callable[..., AbstractContextManager[EmulatedStage]],
 ) -> None:
-    with make(SLOW) as bench:
-        bench.stage.home()
-        bench.stage.start_move(40.0)
-        wait_until(lambda: bench.motor.position_deg > 1.0)
-        bench.motor.hold()
+    with make(SLOW) as emulated:
+        emulated.stage.home()
+        emulated.stage.start_move(40.0)
+        wait_until(lambda: emulated.motor.position_deg > 1.0)
+        emulated.motor.hold()
         with pytest.raises(DeviceError, match=r"stalled at .* on the way to 40 deg.*holds"):
-            bench.stage.wait()
-        wait_until(lambda: not bench.motor.moving)  # it was told to stop pushing
+            emulated.stage.wait()
+        wait_until(lambda: not emulated.motor.moving)  # it was told to stop pushing
 
 
 def test_an_alarm_is_reported_with_its_code_and_forbids_motion(
     make: Callable[..., AbstractContextManager[EmulatedStage]],
 ) -> None:
-    with make(SLOW) as bench:
-        bench.stage.home()
-        bench.stage.start_move(40.0)
-        bench.motor.fail(bench.alarm)
-        code = bench.alarm.lstrip("0")
+    with make(SLOW) as emulated:
+        emulated.stage.home()
+        emulated.stage.start_move(40.0)
+        emulated.motor.fail(emulated.alarm)
+        code = emulated.alarm.lstrip("0")
         with pytest.raises(DeviceError, match=rf"theta_r: .*{code}.*look for what holds the stage"):
-            bench.stage.wait()
-        moves = bench.moves()
+            emulated.stage.wait()
+        moves = emulated.moves()
         with pytest.raises(DeviceError, match=code):
-            bench.stage.start_move(10.0)
+            emulated.stage.start_move(10.0)
         with pytest.raises(DeviceError, match=code):
-            bench.stage.home()
-        assert bench.moves() == moves
+            emulated.stage.home()
+        assert emulated.moves() == moves
 
 
-def test_homing_ends_with_an_error_if_the_reference_is_not_found(bench: EmulatedStage) -> None:
-    bench.motor.homing_fails = True
+def test_homing_ends_with_an_error_if_the_reference_is_not_found(emulated: EmulatedStage) -> None:
+    emulated.motor.homing_fails = True
     with pytest.raises(DeviceError, match=r"reference was not found within 3 s.*reference switch"):
-        bench.stage.home()
-    wait_until(lambda: not bench.motor.homing)
+        emulated.stage.home()
+    wait_until(lambda: not emulated.motor.homing)
 
 
 class _Braking(MotorStage):

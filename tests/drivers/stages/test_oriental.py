@@ -42,63 +42,63 @@ MOVE_WRITE = bytes.fromhex("10 0058 0010 20")
 
 
 @pytest.fixture(params=WIRES)
-def at(request: pytest.FixtureRequest) -> Iterator[EmulatedDrive]:
+def az(request: pytest.FixtureRequest) -> Iterator[EmulatedDrive]:
     with emulated_drive(request.param, reply_s=0.1) as made:
         yield made
 
 
 @pytest.fixture(params=WIRES)
-def slow_at(request: pytest.FixtureRequest) -> Iterator[EmulatedDrive]:
+def slow_az(request: pytest.FixtureRequest) -> Iterator[EmulatedDrive]:
     with emulated_drive(request.param, SLOW, SLOW_LIMITS) as made:
         yield made
 
 
-def test_identity_and_opening_report(at: EmulatedDrive) -> None:
-    stage = at.open()
+def test_identity_and_opening_report(az: EmulatedDrive) -> None:
+    stage = az.open()
     assert stage.identity() == "Oriental Motor AZ drive, by its registers, unit 1"
     assert "output 4020 hex, no alarm" in stage.opening_report
 
 
-def test_homing_moves_and_positions(at: EmulatedDrive) -> None:
-    stage = at.homed()
-    assert at.drive.homings == 1
+def test_homing_moves_and_positions(az: EmulatedDrive) -> None:
+    stage = az.homed()
+    assert az.drive.homings == 1
     for count, angle in enumerate((12.34, -56.78, 169.994, 0.0), start=1):
         stage.start_move(angle)
         arrived = stage.wait()
         assert arrived == pytest.approx(angle, abs=0.5 / STEPS_PER_DEG + 1e-9)
-        assert arrived == pytest.approx(at.motor.position_deg, abs=0.5 / STEPS_PER_DEG)
-        assert at.drive.triggers == count
+        assert arrived == pytest.approx(az.motor.position_deg, abs=0.5 / STEPS_PER_DEG)
+        assert az.drive.triggers == count
     stage.start_move(0.0)  # where it is
     assert stage.wait() == 0.0
 
 
-def test_nothing_is_sent_for_a_move_past_a_limit(at: EmulatedDrive) -> None:
-    stage = at.homed()
-    seen = list(at.wire.seen)
+def test_nothing_is_sent_for_a_move_past_a_limit(az: EmulatedDrive) -> None:
+    stage = az.homed()
+    seen = list(az.wire.seen)
     for angle in (170.01, -170.01, float("nan")):
         with pytest.raises(DeviceError, match="its limits are -170 to 170 deg"):
             stage.start_move(angle)
-    assert at.wire.seen == seen
+    assert az.wire.seen == seen
 
 
-def test_nothing_moves_before_homing(at: EmulatedDrive) -> None:
-    stage = at.open()
+def test_nothing_moves_before_homing(az: EmulatedDrive) -> None:
+    stage = az.open()
     with pytest.raises(DeviceError, match="not homed"):
         stage.start_move(1.0)
-    assert not at.sent(MOVE_WRITE)
+    assert not az.sent(MOVE_WRITE)
 
 
-def test_the_position_is_the_feedback_and_not_the_command(slow_at: EmulatedDrive) -> None:
-    stage = slow_at.homed()
+def test_the_position_is_the_feedback_and_not_the_command(slow_az: EmulatedDrive) -> None:
+    stage = slow_az.homed()
     stage.start_move(90.0)
     assert stage.position_deg() < 45.0
-    assert stage.position_deg() == pytest.approx(slow_at.motor.position_deg, abs=1.0)
+    assert stage.position_deg() == pytest.approx(slow_az.motor.position_deg, abs=1.0)
 
 
 def test_a_stop_from_another_thread_ends_the_wait_and_can_be_repeated(
-    slow_at: EmulatedDrive,
+    slow_az: EmulatedDrive,
 ) -> None:
-    stage, ended = slow_at.homed(), []
+    stage, ended = slow_az.homed(), []
     stage.start_move(90.0)
 
     def wait() -> None:
@@ -108,126 +108,126 @@ def test_a_stop_from_another_thread_ends_the_wait_and_can_be_repeated(
 
     waiting = threading.Thread(target=wait)
     waiting.start()
-    since, before_s = len(slow_at.wire.seen), time.monotonic()
+    since, before_s = len(slow_az.wire.seen), time.monotonic()
     stage.stop()
-    assert slow_at.sent(STOP_TCP, since)[0] - before_s < 0.3
+    assert slow_az.sent(STOP_TCP, since)[0] - before_s < 0.3
     stage.stop()
     waiting.join(timeout=5)
     assert len(ended) == 1
-    assert not slow_at.motor.moving
+    assert not slow_az.motor.moving
     stage.start_move(stage.position_deg() + 0.1)  # the STOP bit is taken back
     stage.wait()
-    assert slow_at.drive.triggers == 2
+    assert slow_az.drive.triggers == 2
 
 
-def test_a_stop_waits_for_one_lost_answer_at_most(slow_at: EmulatedDrive) -> None:
-    stage = slow_at.homed()
+def test_a_stop_waits_for_one_lost_answer_at_most(slow_az: EmulatedDrive) -> None:
+    stage = slow_az.homed()
     stage.start_move(90.0)
-    since = len(slow_at.wire.seen)
-    slow_at.wire.inject(Fault("drop"), Fault("drop"))
+    since = len(slow_az.wire.seen)
+    slow_az.wire.inject(Fault("drop"), Fault("drop"))
     reading = threading.Thread(target=stage.position_deg)
     reading.start()
-    wait_until(lambda: len(slow_at.wire.seen) > since)
+    wait_until(lambda: len(slow_az.wire.seen) > since)
     before_s = time.monotonic()
     stage.stop()  # its own first answer is dropped too
-    assert slow_at.sent(STOP_TCP, since)[0] - before_s < 0.3
-    assert len(slow_at.sent(STOP_TCP, since)) == 2
-    assert not slow_at.motor.moving
+    assert slow_az.sent(STOP_TCP, since)[0] - before_s < 0.3
+    assert len(slow_az.sent(STOP_TCP, since)) == 2
+    assert not slow_az.motor.moving
     reading.join(timeout=5)
 
 
-def test_a_stop_does_not_wait_until_the_line_is_quiet(slow_at: EmulatedDrive) -> None:
-    stage = slow_at.homed()
+def test_a_stop_does_not_wait_until_the_line_is_quiet(slow_az: EmulatedDrive) -> None:
+    stage = slow_az.homed()
     stage.start_move(90.0)
-    slow_at.wire.inject(Fault("drop"))
+    slow_az.wire.inject(Fault("drop"))
     reading = threading.Thread(target=stage.position_deg)
     begun_s = time.monotonic()
     reading.start()
     wait_until(lambda: time.monotonic() - begun_s > 0.3)  # past the time-out: it listens for quiet
-    since, before_s = len(slow_at.wire.seen), time.monotonic()
+    since, before_s = len(slow_az.wire.seen), time.monotonic()
     stage.stop()
-    assert slow_at.sent(STOP_TCP, since)[0] - before_s < 0.1
+    assert slow_az.sent(STOP_TCP, since)[0] - before_s < 0.1
     reading.join(timeout=5)
 
 
-def test_a_stop_left_in_the_drive_is_cleared_before_the_first_motion(at: EmulatedDrive) -> None:
-    at.drive.serve(STOP_TCP)
-    stage = at.homed()
+def test_a_stop_left_in_the_drive_is_cleared_before_the_first_motion(az: EmulatedDrive) -> None:
+    az.drive.serve(STOP_TCP)
+    stage = az.homed()
     stage.start_move(1.0)
     assert stage.wait() == 1.0
 
 
-def test_an_alarm_ends_the_wait_and_forbids_moves(slow_at: EmulatedDrive) -> None:
-    stage = slow_at.homed()
+def test_an_alarm_ends_the_wait_and_forbids_moves(slow_az: EmulatedDrive) -> None:
+    stage = slow_az.homed()
     stage.start_move(90.0)
-    slow_at.motor.fail("66")
+    slow_az.motor.fail("66")
     with pytest.raises(DeviceError, match=r"theta_r: alarm 66h \(hardware overtravel\)"):
         stage.wait()
-    since = len(slow_at.wire.seen)
+    since = len(slow_az.wire.seen)
     for motion in (lambda: stage.start_move(1.0), stage.home):
         with pytest.raises(DeviceError, match="alarm 66h"):
             motion()
-    assert not slow_at.sent(MOVE_WRITE, since)
-    assert (slow_at.drive.triggers, slow_at.drive.homings) == (1, 1)
+    assert not slow_az.sent(MOVE_WRITE, since)
+    assert (slow_az.drive.triggers, slow_az.drive.homings) == (1, 1)
 
 
 def test_a_target_beyond_the_drives_own_limits_raises_its_alarm() -> None:
-    with emulated_drive("pty", replace(FAST, max_deg=90.0)) as at:
-        stage = at.homed()
+    with emulated_drive("pty", replace(FAST, max_deg=90.0)) as az:
+        stage = az.homed()
         stage.start_move(100.0)
         with pytest.raises(DeviceError, match="alarm 67h"):
             stage.wait()
-        assert at.motor.position_deg == 0.0
+        assert az.motor.position_deg == 0.0
 
 
 def test_a_blocked_stage_is_reported_as_stalled() -> None:
-    with emulated_drive("pty", SLOW, SLOW_LIMITS) as at:
-        stage = at.homed()
+    with emulated_drive("pty", SLOW, SLOW_LIMITS) as az:
+        stage = az.homed()
         stage.start_move(30.0)
-        wait_until(lambda: at.motor.position_deg > 0.5)
-        at.motor.hold()
+        wait_until(lambda: az.motor.position_deg > 0.5)
+        az.motor.hold()
         with pytest.raises(DeviceError, match="stalled"):
             stage.wait()
-        assert not at.motor.moving
+        assert not az.motor.moving
 
 
 def test_a_blocked_motor_raises_the_drives_overload_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sim.emulated.oriental_controller, "OVERLOAD_S", 0.2)
-    with emulated_drive("pty", SLOW, SLOW_LIMITS) as at:
-        stage = at.homed()
+    with emulated_drive("pty", SLOW, SLOW_LIMITS) as az:
+        stage = az.homed()
         stage.start_move(30.0)
-        at.motor.hold()
+        az.motor.hold()
         with pytest.raises(DeviceError, match=r"alarm 30h \(overload\)"):
             stage.wait()
 
 
 def test_homing_without_a_reference_ends_with_an_error_and_a_stop() -> None:
-    with emulated_drive("pty", FAST, replace(LIMITS, homing_s=0.2)) as at:
-        at.motor.homing_fails = True
-        stage = at.open()
+    with emulated_drive("pty", FAST, replace(LIMITS, homing_s=0.2)) as az:
+        az.motor.homing_fails = True
+        stage = az.open()
         with pytest.raises(DeviceError, match=r"not found within 0.2 s"):
             stage.home()
-        assert at.sent(STOP_RTU)
-        assert not at.motor.homing
+        assert az.sent(STOP_RTU)
+        assert not az.motor.homing
 
 
-def test_no_move_is_sent_to_a_drive_that_is_not_ready(at: EmulatedDrive) -> None:
-    stage = at.homed()
-    at.drive.serve(bytes.fromhex("06 007D 0040"))  # FREE: the motor is without current
+def test_no_move_is_sent_to_a_drive_that_is_not_ready(az: EmulatedDrive) -> None:
+    stage = az.homed()
+    az.drive.serve(bytes.fromhex("06 007D 0040"))  # FREE: the motor is without current
     with pytest.raises(DeviceError, match=r"not ready to move .* STOP and FREE"):
         stage.start_move(1.0)
-    assert at.drive.triggers == 0
+    assert az.drive.triggers == 0
 
 
-def test_a_moving_stage_refuses_commands(at: EmulatedDrive) -> None:
-    stage = at.homed()
-    at.motor.move(170.0)
-    at.motor.hold()
+def test_a_moving_stage_refuses_commands(az: EmulatedDrive) -> None:
+    stage = az.homed()
+    az.motor.move(170.0)
+    az.motor.hold()
     for command in (lambda: stage.start_move(1.0), stage.home):
         with pytest.raises(DeviceError, match=r"is moving already, .* or stop it first"):
             command()
-    assert at.drive.triggers == 0
-    assert at.motor.moving
+    assert az.drive.triggers == 0
+    assert az.motor.moving
 
 
 @pytest.mark.parametrize("kind", WIRES)
@@ -287,27 +287,27 @@ def test_noise_instead_of_an_answer_is_a_device_error(noise: bytes) -> None:
 
 
 def test_a_device_with_values_out_of_range_is_refused() -> None:
-    with emulated_drive("pty") as at:
-        at.drive.serve(bytes.fromhex("10 0058 0002 04 0000 03E7"))
+    with emulated_drive("pty") as az:
+        az.drive.serve(bytes.fromhex("10 0058 0002 04 0000 03E7"))
         with pytest.raises(DeviceError, match="is no Oriental Motor AZ drive: data number 999"):
-            at.open()
+            az.open()
 
 
-def test_silence_is_an_error_within_two_seconds(at: EmulatedDrive) -> None:
+def test_silence_is_an_error_within_two_seconds(az: EmulatedDrive) -> None:
     begun_s = time.monotonic()
     with pytest.raises(NoReply, match=r"no answer|did not answer"):
-        at.open(unit=7)
+        az.open(unit=7)
     assert time.monotonic() - begun_s < 2.0
 
 
-def test_a_move_costs_few_requests_and_little_time(at: EmulatedDrive) -> None:
-    stage, spent = at.homed(), []
+def test_a_move_costs_few_requests_and_little_time(az: EmulatedDrive) -> None:
+    stage, spent = az.homed(), []
     for _ in range(9):
-        since, begun_s = len(at.wire.seen), time.monotonic()
+        since, begun_s = len(az.wire.seen), time.monotonic()
         stage.start_move(0.0)
         assert stage.wait() == 0.0
         spent.append(time.monotonic() - begun_s)
-        assert len(at.wire.seen) - since <= 6
+        assert len(az.wire.seen) - since <= 6
     assert min(spent) < 0.04
 
 

@@ -241,7 +241,7 @@ class StageMachine(RuleBasedStateMachine):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", STAGES)
-def test_nothing_moves_that_must_not_whatever_is_asked_and_happens(kind: str, slow: bool) -> None:
+def test_random_sequences_never_move_a_stage_that_must_stay(kind: str, slow: bool) -> None:
     machine: Any = type(f"{kind.title()}Machine", (StageMachine,), {"kind": kind})
     examples, steps = (1500, 50) if slow else (40, 20)
     run_state_machine_as_test(

@@ -23,46 +23,48 @@ SLACK_S = 0.4  # a stop may wait for a pending answer; CI has two cores
 
 
 @pytest.fixture(params=list(EMULATED_STAGES))
-def bench(request: pytest.FixtureRequest) -> Iterator[EmulatedStage]:
+def emulated(request: pytest.FixtureRequest) -> Iterator[EmulatedStage]:
     """A slow stage under way, while nobody waits for it."""
-    with EMULATED_STAGES[request.param](SLOW) as bench:
-        bench.stage.home()
-        bench.stage.start_move(70.0)  # takes 3.5 s
-        wait_until(lambda: bench.motor.position_deg > 1.0)
-        yield bench
+    with EMULATED_STAGES[request.param](SLOW) as emulated:
+        emulated.stage.home()
+        emulated.stage.start_move(70.0)  # takes 3.5 s
+        wait_until(lambda: emulated.motor.position_deg > 1.0)
+        yield emulated
 
 
-def test_the_watchdog_probes_while_nobody_polls_and_the_move_goes_on(bench: EmulatedStage) -> None:
-    wait_until(lambda: bench.motor.position_deg > 30.0)  # more than a second later, at 20 deg/s
-    assert bench.motor.moving
-    assert bench.stage.wait() == pytest.approx(70.0, abs=1e-2)
+def test_the_watchdog_probes_while_nobody_polls_and_the_move_goes_on(
+    emulated: EmulatedStage,
+) -> None:
+    wait_until(lambda: emulated.motor.position_deg > 30.0)  # more than a second later, at 20 deg/s
+    assert emulated.motor.moving
+    assert emulated.stage.wait() == pytest.approx(70.0, abs=1e-2)
 
 
-def test_a_silent_line_ends_the_motion_if_nobody_waits(bench: EmulatedStage) -> None:
+def test_a_silent_line_ends_the_motion_if_nobody_waits(emulated: EmulatedStage) -> None:
     silent_s = time.monotonic()
-    bench.wire.inject(*SILENCE)
-    wait_until(lambda: not bench.motor.moving)
+    emulated.wire.inject(*SILENCE)
+    wait_until(lambda: not emulated.motor.moving)
     assert time.monotonic() - silent_s < SILENT_S + SLACK_S
-    assert bench.motor.position_deg < 60.0
+    assert emulated.motor.position_deg < 60.0
     with pytest.raises(DeviceError, match=r"theta_r.*no status for 0.5 s while it moved"):
-        bench.stage.wait()
+        emulated.stage.wait()
 
 
-def test_a_silent_line_ends_the_motion_while_it_is_waited_for(bench: EmulatedStage) -> None:
-    threading.Timer(0.1, lambda: bench.wire.inject(*SILENCE)).start()
+def test_a_silent_line_ends_the_motion_while_it_is_waited_for(emulated: EmulatedStage) -> None:
+    threading.Timer(0.1, lambda: emulated.wire.inject(*SILENCE)).start()
     with pytest.raises(DeviceError, match=r"theta_r.*told to stop"):
-        bench.stage.wait()
-    wait_until(lambda: not bench.motor.moving)
-    assert bench.motor.position_deg < 60.0
+        emulated.stage.wait()
+    wait_until(lambda: not emulated.motor.moving)
+    assert emulated.motor.position_deg < 60.0
 
 
 def test_homing_is_watched_too() -> None:
     for make in EMULATED_STAGES.values():
-        with make(replace(SLOW, homing_s=10.0)) as bench:
-            threading.Timer(0.1, lambda wire=bench.wire: wire.inject(*SILENCE)).start()
+        with make(replace(SLOW, homing_s=10.0)) as emulated:
+            threading.Timer(0.1, lambda wire=emulated.wire: wire.inject(*SILENCE)).start()
             with pytest.raises(DeviceError, match="told to stop"):
-                bench.stage.home()
-            wait_until(lambda motor=bench.motor: not motor.homing)
+                emulated.stage.home()
+            wait_until(lambda motor=emulated.motor: not motor.homing)
 
 
 def test_the_watchdog_runs_only_during_a_motion() -> None:

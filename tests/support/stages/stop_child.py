@@ -1,7 +1,8 @@
-"""A scan in a process of its own that is stopped in the middle of a move; writes how it went.
+"""Scan in a process of its own that is stopped in the middle of a move, for `test_stop`.
 
-`python -m tests.support.stages.stop_child BENCH HOW ...`: SIGINT, SIGTERM, or `exception` in the
-scan itself, a scan for each. Writes the seconds from that moment to the stop's arrival on the wire.
+`python -m tests.support.stages.stop_child STAGE CAUSE ...`: SIGINT, SIGTERM, or `exception` in the
+scan itself, one scan for each cause. Prints the error's type, then the seconds from the cause to
+the arrival of the stop on the wire, and whether the motor still moves.
 """
 
 from __future__ import annotations
@@ -32,41 +33,45 @@ DEADLINE_S = 10.0
 
 
 def main(name: str, how: str) -> None:
-    stop_on_signals()  # anew for each scan: the stop before was another command's
-    with EMULATED_STAGES[name](SLOW) as bench, TemporaryDirectory() as folder:
+    stop_on_signals()  # anew for each scan: an earlier stop belonged to another command
+    with EMULATED_STAGES[name](SLOW) as emulated, TemporaryDirectory() as folder:
         moment: list[float] = []
-        threading.Thread(target=_interrupt, args=(bench, how, moment), daemon=True).start()
+        threading.Thread(target=_interrupt, args=(emulated, how, moment), daemon=True).start()
         try:
-            _scan(bench, how, moment, Path(folder))
+            _scan(emulated, how, moment, Path(folder))
         except (KeyboardInterrupt, DeviceError) as error:
             sys.stdout.write(f"{type(error).__name__}\n")
         end_s = time.monotonic() + DEADLINE_S
-        while not (stops := _stops(bench, moment)):
+        while not (stops := _stops(emulated, moment)):
             if time.monotonic() > end_s:
                 raise SystemExit("no stop on the wire")
             time.sleep(0.001)
-        sys.stdout.write(f"{stops[0] - moment[0]} {bench.motor.moving}\n")
+        sys.stdout.write(f"{stops[0] - moment[0]} {emulated.motor.moving}\n")
 
 
-def _stops(bench: EmulatedStage, moment: list[float]) -> list[float]:
-    """When stops came that belong to what happened at that moment."""
-    return [at for at, data in bench.wire.seen if moment and at >= moment[0] and bench.stop in data]
+def _stops(emulated: EmulatedStage, moment: list[float]) -> list[float]:
+    """Arrival times of stops after that moment."""
+    return [
+        at
+        for at, data in emulated.wire.seen
+        if moment and at >= moment[0] and emulated.stop in data
+    ]
 
 
-def _interrupt(bench: EmulatedStage, how: str, moment: list[float]) -> None:
-    """Once the stage is well under way."""
-    while not (bench.motor.moving and abs(bench.motor.position_deg) > 3):
+def _interrupt(emulated: EmulatedStage, how: str, moment: list[float]) -> None:
+    """Stop the scan once the stage is well under way."""
+    while not (emulated.motor.moving and abs(emulated.motor.position_deg) > 3):
         time.sleep(0.001)
     moment.append(time.monotonic())
     if how != "exception":
         os.kill(os.getpid(), getattr(signal, how))
 
 
-def _scan(bench: EmulatedStage, how: str, moment: list[float], folder: Path) -> None:
+def _scan(emulated: EmulatedStage, how: str, moment: list[float], folder: Path) -> None:
     sweep = {"theta_i_deg": [60.0], "dphi_deg": [0.0], "theta_r_deg": [-70.0, 0.0]}
     loaded = changed(load_protocol(CONFIGS / "protocols" / "demo.yaml"), sweeps=[sweep])
     devices = open_devices(loaded)
-    stage = bench.stage
+    stage = emulated.stage
     if how == "exception":
         stage = _Failing(stage, moment)  # type: ignore[assignment]  # a stand-in
     axis = Axis("theta_r", stage, loaded.rig.axes.theta_r, SystemClock())
@@ -76,7 +81,7 @@ def _scan(bench: EmulatedStage, how: str, moment: list[float], folder: Path) -> 
 
 
 class _Failing:
-    """A stage with which the scan's own work fails in the middle of a move."""
+    """A stage during whose move the scan fails."""
 
     def __init__(self, stage: object, moment: list[float]) -> None:
         self._stage, self._moment = stage, moment

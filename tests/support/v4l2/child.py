@@ -1,4 +1,4 @@
-"""The process that is started under LD_PRELOAD: drives a V4l2Camera as it is told by a pipe.
+"""Child process started under LD_PRELOAD: drives a V4l2Camera by requests from a pipe.
 
 Requests are (name, arguments); each public method of `Child` is one. The answer is (result, error).
 """
@@ -26,7 +26,7 @@ from instrument.errors import DeviceError
 
 
 class MonotonicClock:
-    """The clock of a real rig."""
+    """Clock of a real rig."""
 
     def now_s(self) -> float:
         return time.monotonic()
@@ -50,18 +50,18 @@ class Child:
         return self.camera.identity()
 
     def open_blind(self, settings: V4l2Settings) -> str:
-        """As if the descriptor that OpenCV streams on could not be told from others."""
+        """Open as if the descriptor that OpenCV streams on could not be identified."""
         with patch("drivers.v4l2.open_device._stream_descriptor", return_value=None):
             return self.open(settings)
 
     def ungated_grab(self, count: int) -> list[Frame]:
-        """What a program gets that takes every frame as it comes."""
+        """Frames as they come, without the filter."""
         assert self.camera is not None
         with patch("drivers.v4l2.frame_filter.FrameFilter.accepts", return_value=True):
             return self.camera.grab(count)
 
     def said(self) -> list[str]:
-        """What the driver has logged since this was last asked."""
+        """Messages logged by the driver since the last call."""
         texts = [record.getMessage() for record in self.logged.buffer]
         self.logged.buffer.clear()
         return texts
@@ -72,7 +72,7 @@ class Child:
             camera.close()
 
     def closed_grab(self) -> str:
-        """What a camera says that was closed, twice."""
+        """Error of a camera that was closed twice."""
         camera = self.camera
         assert camera is not None
         camera.close()
@@ -84,7 +84,7 @@ class Child:
         return ""
 
     def times_s(self, count: int) -> list[tuple[float, float | None]]:
-        """When each frame was in hand and its time stamp; the pictures stay here."""
+        """Arrival time and time stamp of each frame; the images stay here."""
         assert self.camera is not None
         return [(frame.time_s, frame.device_time_s) for frame in self.camera.grab(count)]
 

@@ -1,4 +1,4 @@
-"""An emulated V4L2 camera for tests: the device model here, OpenCV and driver in a child process.
+"""Emulated V4L2 camera for tests: device model here, OpenCV and driver in a child process.
 
 The loader reads LD_PRELOAD when a process starts, so the driver runs in a child of its own. One
 child serves a whole module; each test brings its own device model.
@@ -85,7 +85,7 @@ class RemoteCamera:
         return self.answer()
 
     def interrupt(self) -> None:
-        """What Ctrl-C does."""
+        """Send SIGINT, as Ctrl-C does."""
         self._process.send_signal(signal.SIGINT)
 
     def identity(self) -> str:
@@ -100,22 +100,22 @@ class RemoteCamera:
 
 
 class LevelScene:
-    """What the emulated camera looks at: a level, and what was exposed of it when.
+    """Scene of the emulated camera: one level; the exposures taken are kept.
 
-    Each picture says in its first row what it is of: level, exposure in 100 µs, gain, sequence.
+    The first row of each image holds level, exposure in 100 µs, gain and sequence number.
     """
 
     def __init__(self) -> None:
         self.level = 0
         self.exposed: list[Exposure] = []
-        self.begun = 0  # exposures, those included that nobody takes
+        self.begun = 0  # exposures, including those whose frames nobody takes
 
     def snapshot(self) -> object:
         self.begun += 1
         return self.level
 
     def wait_exposures(self, count: int) -> None:
-        """Until the sensor has begun `count` more exposures."""
+        """Wait until the sensor has begun `count` more exposures."""
         target = self.begun + count
         wait_for(lambda: self.begun >= target, f"{count} more exposures")
 
@@ -137,7 +137,7 @@ def level(frame: Frame) -> int:
 
 
 def steps(frame: Frame) -> int:
-    """The exposure that the picture is of, in 100 µs."""
+    """Exposure of the image, in 100 µs."""
     return int(frame.image[0, 1])
 
 
@@ -145,7 +145,7 @@ def steps(frame: Frame) -> int:
 def served(
     remote: RemoteCamera, scene: LevelScene, capabilities: Capabilities = QUICK, **changes: Any
 ) -> Iterator[EmulatedCamera]:
-    """The device model while a test needs it; the child lets go of it at the end."""
+    """Run the device model; the child closes it at the end."""
     camera = EmulatedCamera(scene.render, scene.snapshot, replace(capabilities, **changes))
     with V4l2Server(camera, remote.socket):
         try:
@@ -164,7 +164,7 @@ def child(factory: pytest.TempPathFactory) -> Iterator[RemoteCamera]:
 
 
 def wait_for(condition: Callable[[], bool], what: str) -> None:
-    """Look again and again until it is so, at most until the deadline."""
+    """Return once the condition is true; fail at the deadline."""
     until_s = time.monotonic() + DEADLINE_S
     while not condition():
         assert time.monotonic() < until_s, f"{what}: not within {DEADLINE_S} s"
