@@ -40,8 +40,7 @@ class Lines(Closeable):
         """Return the line of a serial port; the first call opens it."""
         if port not in self._serial:
             line = Line(who, port, baudrate, self.clock, xonxoff)
-            self._closing.callback(line.close)
-            self._serial[port] = line
+            self._serial[port] = self._closing.enter_context(line)
         return self._serial[port]
 
     def modbus(self, who: str, settings: BusSettings) -> ModbusBus:
@@ -50,8 +49,7 @@ class Lines(Closeable):
 
         if settings.port not in self._modbus:
             bus = ModbusBus(who, settings, self.clock)
-            self._closing.callback(bus.close)
-            self._modbus[settings.port] = bus
+            self._modbus[settings.port] = self._closing.enter_context(bus)
         return self._modbus[settings.port]
 
 
@@ -71,9 +69,8 @@ def open_stage(name: str, axis: Wired, port: str, lines: Lines) -> MotorStage:
 def _newport(name: str, axis: NewportAxis, port: str, lines: Lines) -> MotorStage:
     from drivers.stages.newport import BAUDRATE, NewportStage
 
-    model = axis.model
-    line = lines.serial(name, port, BAUDRATE[model], xonxoff=model == "SMC100")
-    return NewportStage(name, line, axis.address, model, _limits(axis), lines.clock)
+    line = lines.serial(name, port, BAUDRATE[axis.model], xonxoff=axis.model == "SMC100")
+    return NewportStage(name, line, axis.address, axis.model, _limits(axis), lines.clock)
 
 
 def _zaber(name: str, axis: ZaberAxis, port: str, lines: Lines) -> MotorStage:

@@ -160,14 +160,10 @@ class ModbusUnit:
         self, bus: ModbusBus, who: str, unit: int, known_register: int, resync_counts: Sequence[int]
     ) -> None:
         self._bus, self._who, self._unit = bus, who, unit
+        self.where = f"{bus.port}, unit {unit}"
         self._known, self._counts = known_register, cycle(resync_counts)
         self._last_error: DeviceError | None = None
         self._out_of_step = True  # an earlier user of the line may have left an answer on it
-
-    @property
-    def where(self) -> str:
-        """Port and unit address."""
-        return f"{self._bus.port}, unit {self._unit}"
 
     def deadline_s(self) -> float:
         """Return the time of the bus's clock until which an exchange may still begin."""

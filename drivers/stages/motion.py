@@ -91,7 +91,8 @@ class MoveMonitor(_Monitor):
     def ended(self, now: Status) -> bool:
         """True once the stage stands, unless the move has not begun yet."""
         self._begun |= now.moving or abs(now.position_deg - self._start) > self._step_deg
-        return not now.moving and (self._begun or self._at_target(now))
+        off_deg = abs(now.position_deg - self._target)
+        return not now.moving and (self._begun or off_deg <= self._limits.tolerance_deg)
 
     def problem(self, now: Status, time_s: float) -> str:
         """Return a description of what is wrong with the move, or an empty text."""
@@ -110,6 +111,3 @@ class MoveMonitor(_Monitor):
     @property
     def _step_deg(self) -> float:
         return self._limits.tolerance_deg / 10
-
-    def _at_target(self, now: Status) -> bool:
-        return abs(now.position_deg - self._target) <= self._limits.tolerance_deg

@@ -275,7 +275,7 @@ class MotorStage(ABC):
         return now.position_deg
 
     def _repeat_stop(self) -> None:
-        """Repeat a stop that came while a command was being sent and may have overtaken it."""
+        """Repeat a stop that came while a command was being sent, and raise `Stopped`."""
         if self._stopped:
             self._send_stop()
             raise Stopped(f"{self.name}: stopped as it was about to move")

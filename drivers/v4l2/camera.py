@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from drivers.v4l2 import ioctl
 from drivers.v4l2.capture import Traits
-from drivers.v4l2.open_device import CHECK_CABLE, camera_lost
+from drivers.v4l2.open_device import CHECK_USB, camera_lost
 from drivers.v4l2.session import EXTRA_FRAMES, Session
 from drivers.v4l2.settings import V4l2Settings
 from drivers.v4l2.worker_thread import Heartbeat, Hung, WorkerThread
@@ -109,7 +109,7 @@ class V4l2Camera(Closeable):
     def _opened(self) -> Session:
         """Return the session; try to reopen a lost camera, with growing pauses."""
         if self._closed:
-            raise DeviceError(f"camera {self._settings.device}: is closed; open it anew")
+            raise DeviceError(f"camera {self._settings.device}: is closed; open it again")
         until_s = self._clock.now_s() + _REOPEN_S
         pause_s = _FIRST_PAUSE_S
         while self._session is None:
@@ -125,7 +125,7 @@ class V4l2Camera(Closeable):
 
     def _open(self) -> None:
         if self._released not in wait((self._released,), _FIRST_PAUSE_S).done:
-            raise CameraLost(f"{self._who()}: its driver hangs; {CHECK_CABLE}")
+            raise CameraLost(f"{self._who()}: its driver hangs; {CHECK_USB}")
         arguments = (self._settings, self._steps, self._traits, self._clock)
         session = self._call(lambda beat: Session(*arguments, beat), _OPENING_S)
         self._session, self._traits = session, session.traits
@@ -144,8 +144,8 @@ class V4l2Camera(Closeable):
         except Hung:
             self._drop_session()
             raise CameraLost(
-                f"{self._who()}: its driver has not answered for {silent_s:.1f} s; {CHECK_CABLE}; "
-                "the next try opens the camera anew"
+                f"{self._who()}: its driver has not answered for {silent_s:.1f} s; {CHECK_USB}; "
+                "the next attempt reopens the camera"
             ) from None
         except OSError as error:
             self._drop_session()

@@ -17,13 +17,7 @@ from numpy.typing import NDArray
 
 from drivers.v4l2 import ioctl
 from drivers.v4l2.controls import EXPOSURE, GAIN, Controls
-from drivers.v4l2.open_device import (
-    CHECK_CABLE,
-    buffer_count,
-    camera_lost,
-    open_control,
-    open_video,
-)
+from drivers.v4l2.open_device import CHECK_USB, buffer_count, camera_lost, open_control, open_video
 from drivers.v4l2.settings import STEPS_PER_S, V4l2Settings
 from drivers.v4l2.worker_thread import Heartbeat
 from instrument.clock import Clock
@@ -74,6 +68,7 @@ class Capture:
             self.capability = ioctl.capability(self._control)
             self._who = f"camera {self.capability.card} ({settings.device})"
             self._video, self._stream = open_video(settings, self._control, self._who)
+            self.can_query_buffers = self._stream is not None
         except BaseException:
             os.close(self._control)
             raise
@@ -99,11 +94,6 @@ class Capture:
         """Every control that was set, as read back."""
         return dict(self._controls.read_back)
 
-    @property
-    def can_query_buffers(self) -> bool:
-        """True if the descriptor that OpenCV streams on was found."""
-        return self._stream is not None
-
     def close(self) -> None:
         """Close the camera."""
         self._video.release()
@@ -121,7 +111,7 @@ class Capture:
         if not started and self._clock.now_s() - began_s < _AT_ONCE_S:
             raise CameraLost(
                 f"{self._who}: the stream could not be started; look whether the camera shares its "
-                "USB hub with others, and plug it in anew"
+                "USB hub with others, and plug it in again"
             )
         if not started:
             self.next(heartbeat, self._exposure_s + _STARTING_S)
@@ -157,7 +147,7 @@ class Capture:
         self.check_presence()
         raise CameraLost(
             f"{self._who}: no frame for {patience_s:.1f} s at an exposure of {self._exposure_s:g} "
-            f"s: the stream stands still; {CHECK_CABLE}; the next try opens the camera anew"
+            f"s: the stream stands still; {CHECK_USB}; the next attempt reopens the camera"
         )
 
     def _is_filled(self, heartbeat: Heartbeat, deadline_s: float) -> bool:
@@ -229,7 +219,7 @@ class Capture:
     def bad_frames_error(self, fault: str, times: int) -> DeviceError:
         """Return the error for too many bad frames in a row."""
         return DeviceError(
-            f"{self._who}: {times} bad frames in a series, the last {fault}; {CHECK_CABLE}"
+            f"{self._who}: {times} bad frames in a series, the last {fault}; {CHECK_USB}"
         )
 
     def check_presence(self) -> None:

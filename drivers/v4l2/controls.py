@@ -93,7 +93,7 @@ class Controls:
             raise DeviceError(
                 f"{asked}; the camera refused it ({os.strerror(error.errno or 0)}) although it "
                 f"allows {_range(found, control)}; look whether another program uses the camera, "
-                "or plug it in anew"
+                "or plug it in again"
             ) from error
         read_back = ioctl.control_value(self._descriptor, found.number)
         if read_back != value:

@@ -17,7 +17,7 @@ from instrument.errors import CameraLost, DeviceError
 if TYPE_CHECKING:
     from cv2 import VideoCapture
 
-CHECK_CABLE = "look at the USB cable, at the camera and at the computer, and at the hub between"
+CHECK_USB = "look at the USB cable, at the camera and at the computer, and at the hub between"
 _MIN_BUFFERS = 2
 
 
@@ -25,7 +25,7 @@ def camera_lost(who: str, error: OSError) -> CameraLost:
     """Return the error for a camera that no longer answers."""
     return CameraLost(
         f"{who}: is gone ({os.strerror(error.errno or 0)}), unplugged or without power; "
-        f"{CHECK_CABLE}; the next try opens the camera anew"
+        f"{CHECK_USB}; the next attempt reopens the camera"
     )
 
 
@@ -36,7 +36,7 @@ def open_control(settings: V4l2Settings) -> int:
     except OSError as error:
         raise CameraLost(
             f"camera {settings.device}: cannot be opened ({os.strerror(error.errno or 0)}); "
-            f"{CHECK_CABLE}, and that the rig file names a device that `gonio devices` lists"
+            f"{CHECK_USB}, and that the rig file names a device that `gonio devices` lists"
         ) from error
 
 
@@ -53,7 +53,7 @@ def open_video(settings: V4l2Settings, control: int, who: str) -> tuple[VideoCap
             ioctl.capability(control)
             raise CameraLost(
                 f"{who}: is there, but OpenCV cannot open it: no buffers, or no format that OpenCV "
-                "knows; look whether another program uses the camera, or plug it in anew"
+                "knows; look whether another program uses the camera, or plug it in again"
             )
         _set_format(video, settings)
         stream = _stream_descriptor(before, control)
@@ -125,7 +125,7 @@ def _check_buffers(video: VideoCapture, stream: int | None, who: str) -> None:
     if given < _MIN_BUFFERS:
         raise CameraLost(
             f"{who}: gave {given} buffers, at least {_MIN_BUFFERS} are needed; look whether "
-            "another program uses the camera, or plug it in anew"
+            "another program uses the camera, or plug it in again"
         )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from dataclasses import replace
 
-from drivers.v4l2 import ioctl
 from drivers.v4l2.capture import PATIENCE_S, Capture, Traits
 from drivers.v4l2.frame_filter import FrameFilter
 from drivers.v4l2.settings import STEPS_PER_S, V4l2Settings
@@ -35,6 +34,7 @@ class Session:
     ) -> None:
         self._settings, self._clock, self._steps = settings, clock, exposure_steps
         self._capture = Capture(settings, exposure_steps, clock)
+        self.capability = self._capture.capability
         try:
             if traits is None:
                 traits = self._capture.measure_traits(heartbeat)
@@ -53,11 +53,6 @@ class Session:
             settings.exposure_delay_frames,
             None if traits.monotonic else settings.buffers + EXTRA_FRAMES,
         )
-
-    @property
-    def capability(self) -> ioctl.Capability:
-        """Driver, card and bus of the camera."""
-        return self._capture.capability
 
     @property
     def settings(self) -> dict[str, str]:
@@ -100,7 +95,7 @@ class Session:
                 bad += 1
                 if bad > MAX_BAD_FRAMES:
                     raise self._capture.bad_frames_error(fault, bad)
-                log.warning("camera %s: a frame %s: taken anew", self._settings.device, fault)
+                log.warning("camera %s: a frame %s: taken again", self._settings.device, fault)
                 continue
             frames.append(frame)
             bad = 0

@@ -32,7 +32,7 @@ def emulated(request: pytest.FixtureRequest) -> Iterator[EmulatedStage]:
         yield emulated
 
 
-def test_the_watchdog_probes_while_nobody_polls_and_the_move_goes_on(
+def test_the_watchdog_probes_while_nobody_polls(
     emulated: EmulatedStage,
 ) -> None:
     wait_until(lambda: emulated.motor.position_deg > 30.0)  # more than a second later, at 20 deg/s

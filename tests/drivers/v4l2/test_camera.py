@@ -195,4 +195,4 @@ def test_no_descriptor_or_thread_is_left_behind(remote: RemoteCamera, scene: Lev
 def test_a_closed_camera_refuses_to_grab(remote: RemoteCamera, scene: LevelScene) -> None:
     with served(remote, scene):
         remote.ask("open", SETTINGS)
-        assert remote.ask("closed_grab") == (f"camera {DEVICE}: is closed; open it anew")
+        assert remote.ask("closed_grab") == (f"camera {DEVICE}: is closed; open it again")

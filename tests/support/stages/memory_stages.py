@@ -138,7 +138,7 @@ class NoWatchdog(Watchdog):
 
 @dataclass
 class MemoryStage:
-    """A stage's surroundings in memory; `open` makes the driver anew on the same wire."""
+    """A stage's surroundings in memory; `open` opens a new driver on the same wire."""
 
     clock: CountingClock
     motor: Motor

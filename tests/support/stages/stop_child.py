@@ -33,7 +33,7 @@ DEADLINE_S = 10.0
 
 
 def main(name: str, how: str) -> None:
-    stop_on_signals()  # anew for each scan: an earlier stop belonged to another command
+    stop_on_signals()  # again for each scan: an earlier stop belonged to another command
     with EMULATED_STAGES[name](SLOW) as emulated, TemporaryDirectory() as folder:
         moment: list[float] = []
         threading.Thread(target=_interrupt, args=(emulated, how, moment), daemon=True).start()

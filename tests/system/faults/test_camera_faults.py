@@ -227,7 +227,7 @@ def test_a_bad_frame_is_retaken(
     assert result.error is None
     assert result.readings == whole
     if state == "reading":  # in other states it may have been among the frames dropped as outdated
-        assert any("taken anew" in text for text in result.events["retry"])
+        assert any("taken again" in text for text in result.events["retry"])
 
 
 @pytest.mark.parametrize("state", STATES)
