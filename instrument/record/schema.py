@@ -80,13 +80,12 @@ def _text(name: str) -> Column:
 
 
 _ID = Column("id", "INTEGER", "", "a whole number")
-_COUNT_KEYS = "'steps', 'hidden'"
 _META_VALUE = Column(
     "value",
     "TEXT",
-    f"key NOT IN ({_COUNT_KEYS}) OR (length(CAST(value AS BLOB)) BETWEEN 1 AND 9 "
+    "key NOT IN ('steps', 'hidden') OR (length(CAST(value AS BLOB)) BETWEEN 1 AND 9 "
     "AND length(value) = length(CAST(value AS BLOB)) AND value NOT GLOB '*[^0-9]*')",
-    f"a whole number of up to 9 digits for {_COUNT_KEYS}, else text in UTF-8".replace("'", ""),
+    "a whole number of up to 9 digits for steps, hidden, else text in UTF-8",
 )
 _EXPOSURE_S = _number("exposure_s", 1e-9, 1e6)
 _READING = (
@@ -120,20 +119,12 @@ TABLES: dict[str, tuple[Column, ...]] = {
     "setting": (_ID, _plain("time_utc"), _text("role"), _text("name"), _text("value")),
     "event": (_ID, _plain("time_utc"), _text("kind"), _text("text")),
     "dark": (
-        _ID,
-        _plain("time_utc"),
-        _EXPOSURE_S,
-        _integer("frames", 1),
-        _number("mean_dn"),
+        _ID, _plain("time_utc"), _EXPOSURE_S, _integer("frames", 1), _number("mean_dn"),
         _number("noise_dn"),
     ),
     "frame": (
-        _integer("step"),
-        _integer("number"),
-        _EXPOSURE_S,
-        _number("time_s"),
-        _number("device_time_s", optional=True),
-        _plain("file", optional=True),
+        _integer("step"), _integer("number"), _EXPOSURE_S, _number("time_s"),
+        _number("device_time_s", optional=True), _plain("file", optional=True),
     ),
     "preview": (
         _integer("step"),
@@ -143,13 +134,10 @@ TABLES: dict[str, tuple[Column, ...]] = {
     ),
     "reading": _READING,
     "drift_at_resume": (
-        _integer("before_step"),
-        _number("expected"),
-        _number("u_expected", 0.0),
-        _integer("jumped", 0, 1),
-        *_READING,
+        _integer("before_step"), _number("expected"), _number("u_expected", 0.0),
+        _integer("jumped", 0, 1), *_READING,
     ),
-}
+}  # fmt: skip
 """All tables with their columns; the first column identifies a row in messages."""
 
 MARKS = ", ".join("?" * len(_READING))
