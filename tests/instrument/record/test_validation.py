@@ -10,6 +10,7 @@ import pytest
 from instrument.errors import InputError
 from instrument.record import validation
 from instrument.record.record import FILE_NAME, Record
+from instrument.record.schema import TABLES
 from tests.support.storage.sample_records import small_record
 from tests.support.strangers.mutations import Mutator, feed
 from tests.support.strangers.run_folders import REFUSED, Sent, copy_of
@@ -87,6 +88,29 @@ def test_more_than_can_be_reduced_is_refused(sent: Sent, monkeypatch: pytest.Mon
     monkeypatch.setattr(validation, "MOST_WORK", 1)
     with pytest.raises(InputError, match=r"readings, .* are too many"):
         Record.open(sent.folder)
+
+
+COLUMNS = [column.name for column in TABLES["reading"]]
+
+
+def _numbered(column: str) -> str:
+    kind = "CASE WHEN i % 25 THEN 'point' ELSE 'drift' END"
+    return {"step": "i", "time_s": "CAST(i AS REAL)", "kind": kind}.get(column, column)
+
+
+def test_a_scan_of_60_000_points_with_a_drift_check_every_25_opens(tmp_path: Path) -> None:
+    """It is not too many: reduction is linear in the drift checks, see `test_soak`."""
+    small_record(tmp_path / "run").close()
+    sent = copy_of(tmp_path / "run", tmp_path)
+    sent.sql(
+        "DELETE FROM reading WHERE step > 0",
+        "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 62400) "
+        f"INSERT INTO reading SELECT {', '.join(_numbered(name) for name in COLUMNS)} "
+        "FROM reading, n",
+    )
+    with Record.open(sent.folder) as record:
+        kinds = [r.kind for r in record.readings()]
+    assert (kinds.count("point"), kinds.count("drift")) == (59904, 2497)
 
 
 @pytest.mark.slow
