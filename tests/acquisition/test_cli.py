@@ -1,235 +1,42 @@
-"""The command `gonio`, as scripts and people use it: files, exit codes, messages."""
+"""The command line: usage, errors as exit codes, and the place that modules come from."""
 
 from __future__ import annotations
 
-import csv
-import json
-import re
-import shutil
-import signal
-import sqlite3
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+import typer
 
-from tests.support.command import gonio as gonio_process
+from acquisition.cli import errors_as_exit_codes
+from instrument.errors import DeviceError, InputError, NotDetermined, OperatorStop, StorageError
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import small_demo
 
 DEADLINE_S = 60.0
 
 
-@pytest.fixture(scope="module")
-def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A protocol of two incidences and nine view angles."""
-    return small_demo(tmp_path_factory.mktemp("protocol"))
-
-
-@pytest.fixture(scope="module")
-def run(
-    small: Path, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    """A run by a process of its own: its folder, and what it said."""
-    folder = tmp_path_factory.mktemp("runs") / "run"
-    done = gonio_process("run", small, "--out", folder)
-    assert done.returncode == 0, done.stderr
-    return folder, done
-
-
-@pytest.fixture(scope="module")
-def finished(run: tuple[Path, subprocess.CompletedProcess[str]]) -> Path:
-    return run[0]
-
-
-@pytest.fixture(scope="module")
-def stopped(small: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run that somebody stopped with Ctrl-C: copy it before anything is done to it."""
-    folder = tmp_path_factory.mktemp("stopped") / "run"
-    _stop_after_some_readings(small, folder, signal.SIGINT)
-    return folder
-
-
-def rows(folder: Path) -> list[dict[str, str]]:
-    with (folder / "measurements.csv").open() as file:
-        return list(csv.DictReader(file))
-
-
-def test_a_run_leaves_what_the_design_promises(finished: Path) -> None:
-    assert {p.name for p in finished.iterdir()} >= {
-        "record.sqlite", "protocol.yaml", "rig.yaml", "measurements.csv", "fit.json", "report.html",
-    }  # fmt: skip
-    header = (finished / "measurements.csv").read_text().splitlines()[0]
-    assert header.startswith(
-        "theta_i_deg,theta_r_deg,dphi_deg,radiance,u_radiance,brdf,u_brdf,"
-        "window_pixels,exposure_s,frames,flags,time_utc"
-    )
-    table = rows(finished)
-    assert len(table) == 18 - 1  # (60, 60) is hidden by the lamp
-    assert {float(row["theta_r_deg"]) for row in table} >= {-80.0, 0.0, 80.0}
-    assert all(0 < float(row["u_brdf"]) < 0.1 * float(row["brdf"]) for row in table)
-
-
-def test_the_fit_keeps_its_contract(finished: Path) -> None:
-    fit = json.loads((finished / "fit.json").read_text())
-    assert set(fit) >= {"chosen", "verdict", "candidates"}
-    assert fit["chosen"] in {c["model"] for c in fit["candidates"]}
-    assert fit["verdict"] in {"adequate", "none adequate", "not identifiable"}
-    for candidate in fit["candidates"]:
-        assert set(candidate) >= {
-            "model", "parameters", "rms_relative", "reduced_chi2", "bic", "converged",
-        }  # fmt: skip
-        for parameter in candidate["parameters"].values():
-            assert parameter["u"] is not None or len(parameter["interval"]) == 2
-
-
-def test_the_person_is_told_the_model_and_where_the_report_is(
-    run: tuple[Path, subprocess.CompletedProcess[str]],
+@pytest.mark.parametrize(
+    ("error", "code", "message"),
+    [
+        (InputError("a.yaml:1:2: wrong", "a.yaml:3:4: wrong"), 2, "a.yaml:3:4: wrong"),
+        (DeviceError("theta_r: stalled"), 3, "theta_r: stalled"),
+        (StorageError("disk full"), 3, "disk full"),
+        (PermissionError(13, "Permission denied", "run"), 3, "Permission denied: 'run'"),
+        (OperatorStop("stopped at the prompt"), 4, "stopped at the prompt"),
+        (KeyboardInterrupt(), 4, "stopped by the operator"),
+        (NotDetermined("two points"), 5, "two points"),
+        (DeviceError("answer \x1b[2J"), 3, "answer \\x1b[2J"),  # no command to the terminal
+    ],
+)
+def test_an_error_is_a_message_and_an_exit_code(
+    error: BaseException, code: int, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder, done = run
-    assert "oren_nayar+torrance_sparrow" in done.stdout
-    assert re.search(r"sigma_deg\s.*±", done.stdout)
-    assert str(folder / "report.html") in done.stdout
-
-
-def test_json_is_alone_on_standard_output(finished: Path, tmp_path: Path, small: Path) -> None:
-    for done in (
-        gonio("report", finished, "--json"),
-        gonio("run", small, "--out", tmp_path / "run", "--json"),
-    ):
-        assert done.returncode == 0
-        assert json.loads(done.stdout)["chosen"] == "oren_nayar+torrance_sparrow"
-    assert gonio("plan", small, "--json").stdout.startswith("{")
-
-
-def test_the_plan_is_shown_and_touches_nothing(small: Path, tmp_path: Path) -> None:
-    done = gonio("plan", small, cwd=tmp_path)
-    assert done.returncode == 0
-    for words in ("17 to measure", "1 where camera and lamp hide one another", "about"):
-        assert words in done.stdout
-    assert not list(tmp_path.iterdir())
-
-
-def test_out_is_refused_unless_absent_or_empty(finished: Path, small: Path) -> None:
-    before = sorted(p.name for p in finished.iterdir())
-    done = gonio("run", small, "--out", finished)
-    assert done.returncode == 2
-    assert "must be absent or an empty folder" in done.stderr
-    assert sorted(p.name for p in finished.iterdir()) == before
-
-
-def test_every_mistake_in_a_file_is_named_at_once_and_nothing_moves(
-    small: Path, tmp_path: Path
-) -> None:
-    text = small.read_text().replace("num: 9", "num: 0").replace("ks: 0.076", "kz: 0.076")
-    wrong = tmp_path / "wrong.yaml"
-    wrong.write_text(text + "hurry: true\n")
-    done = gonio("run", wrong, "--out", tmp_path / "run")
-    assert done.returncode == 2
-    lines = done.stderr.splitlines()
-    assert all(re.match(rf"{re.escape(str(wrong))}:\d+:\d+: ", line) for line in lines)
-    for words in ("theta_r_deg.num", "kz", "hurry"):
-        assert sum(words in line for line in lines) == 1, done.stderr
-    assert not (tmp_path / "run").exists()
-
-
-# SIGTERM: `test_emulated`
-def test_a_stopped_scan_says_how_to_go_on_and_goes_on(
-    stopped: Path, finished: Path, tmp_path: Path
-) -> None:
-    folder = shutil.copytree(stopped, tmp_path / "run")
-    resumed = gonio("resume", folder, "--yes")
-    assert resumed.returncode == 0, resumed.stderr
-    again, whole = rows(folder), rows(finished)
-    key = [(r["theta_i_deg"], r["dphi_deg"], r["theta_r_deg"]) for r in again]
-    assert key == [(r["theta_i_deg"], r["dphi_deg"], r["theta_r_deg"]) for r in whole]
-    for a, b in zip(again, whole, strict=True):
-        assert float(a["brdf"]) == pytest.approx(float(b["brdf"]), rel=2e-3)
-
-
-def _stop_after_some_readings(protocol: Path, folder: Path, stop: signal.Signals) -> None:
-    """Start a slow enough run, wait until readings are on disk, send the signal."""
-    text = protocol.read_text().replace("frames_per_point: 4", "frames_per_point: 60")
-    protocol = folder.with_suffix(".yaml")
-    protocol.write_text(text)
-    process = subprocess.Popen(
-        [sys.executable, "-m", "acquisition", "run", protocol, "--out", folder],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    deadline = time.monotonic() + DEADLINE_S
-    while _readings(folder) < 3:
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    process.send_signal(stop)
-    _, errors = process.communicate(timeout=DEADLINE_S)
-    assert process.returncode == 4, errors
-    assert f"gonio resume {folder}" in errors
-    assert "Traceback" not in errors
-    assert not (folder / "record.sqlite-wal").exists()  # the record was closed in order
-
-
-def _readings(folder: Path) -> int:
-    try:
-        database = sqlite3.connect(f"file:{folder / 'record.sqlite'}?mode=ro", uri=True)
-        try:
-            return int(database.execute("SELECT COUNT(*) FROM reading").fetchone()[0])
-        finally:
-            database.close()
-    except sqlite3.OperationalError:
-        return 0
-
-
-def test_resuming_needs_a_word_that_the_rig_may_move(stopped: Path) -> None:
-    done = gonio("resume", stopped)
-    assert done.returncode == 2
-    assert "--yes" in done.stderr
-
-
-def test_a_finished_run_is_reported_again(finished: Path) -> None:
-    before = (finished / "measurements.csv").read_text()
-    (finished / "report.html").unlink()
-    done = gonio("resume", finished)
-    assert done.returncode == 0
-    assert (finished / "report.html").exists()
-    assert (finished / "measurements.csv").read_text() == before
-
-
-def test_a_changed_protocol_is_not_resumed(finished: Path, tmp_path: Path) -> None:
-    copy = tmp_path / "copy"
-    shutil.copytree(finished, copy)
-    path = copy / "protocol.yaml"
-    path.write_text(path.read_text().replace("num: 9", "num: 11"))
-    done = gonio("resume", copy, "--yes")
-    assert done.returncode == 2
-    assert "changed since the run began" in done.stderr
-
-
-@pytest.mark.parametrize("command", ["resume", "report"])
-def test_a_folder_without_a_run_is_named(command: str, tmp_path: Path) -> None:
-    done = gonio(command, tmp_path)
-    assert done.returncode == 2
-    assert f"{tmp_path}: no record.sqlite there" in done.stderr
-
-
-def test_without_a_white_tile_the_scan_is_whole_and_only_the_shape_is_determined(
-    small: Path, tmp_path: Path
-) -> None:
-    text = re.sub(r"  white_tile:.*\n", "", small.read_text())
-    protocol = tmp_path / "relative.yaml"
-    protocol.write_text(text)
-    done = gonio("run", protocol, "--out", tmp_path / "run")
-    assert done.returncode == 0, done.stderr
-    assert "do not determine albedo" in " ".join(done.stdout.split())
-    assert all(row["brdf"] == "" and float(row["radiance"]) > 0 for row in rows(tmp_path / "run"))
-    fit = json.loads((tmp_path / "run" / "fit.json").read_text())
-    assert fit["verdict"] == "not identifiable"
-    found = next(c for c in fit["candidates"] if c["model"] == fit["chosen"])["parameters"]
-    assert found["albedo"]["u"] is None
-    assert abs(found["sigma_deg"]["value"] - 20) < 4 * found["sigma_deg"]["u"]
-    assert "radiance is relative" in (tmp_path / "run" / "report.html").read_text()
+    with pytest.raises(typer.Exit) as ended, errors_as_exit_codes():
+        raise error
+    assert ended.value.exit_code == code
+    assert message in capsys.readouterr().err
 
 
 def test_usage_errors_exit_with_2() -> None:
@@ -240,21 +47,13 @@ def test_usage_errors_exit_with_2() -> None:
     assert "no_such_protocol.yaml" in missing.stderr
 
 
-def test_a_stopped_run_is_reported_as_unfinished(stopped: Path, tmp_path: Path) -> None:
-    shutil.copytree(stopped, tmp_path / "run")
-    done = gonio("report", tmp_path / "run")
-    assert done.returncode in (0, 5), done.stderr
-    assert "Traceback" not in done.stderr
-    assert f"gonio resume {tmp_path / 'run'}" in done.stdout + done.stderr
-
-
-def test_nothing_in_the_working_folder_is_taken_for_the_program(
-    small: Path, tmp_path: Path
+def test_no_module_is_imported_from_the_working_folder(
+    tmp_path: Path,
 ) -> None:
     (tmp_path / "analysis.py").write_text("raise SystemExit('not this one')")
     command = "import sys; sys.path.pop(0); from acquisition.cli import main; main()"
     done = subprocess.run(
-        [sys.executable, "-c", command, "run", small, "--out", tmp_path / "run"],
+        [sys.executable, "-c", command, "run", small_demo(tmp_path), "--out", tmp_path / "run"],
         cwd=tmp_path, capture_output=True, text=True, check=False, timeout=DEADLINE_S,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
