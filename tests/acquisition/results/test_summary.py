@@ -1,0 +1,77 @@
+"""Results in words: the headline, parameters, notes and the uncertainty budget."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from acquisition.engine.engine import Engine
+from acquisition.plan.plan import make_plan
+from acquisition.results.fitting import Fitted, fit_run, u_without
+from acquisition.results.reduction import DARK, ROUNDING, Reduced, reduced_run
+from acquisition.results.run_folder import run_meta
+from acquisition.results.summary import budget, headline, notes, value_text
+from acquisition.rig import open_devices
+from analysis.report.data import Parameter
+from instrument.config.load import Loaded
+from instrument.record.record import Record
+from tests.support.scans import small_scan
+
+Results = tuple[Loaded, Reduced, Fitted, tuple[str, ...]]
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """A small scan of the rig with an 8-bit camera, whose lamp is set by hand."""
+    loaded = small_scan("paper_1995")
+    plan, folder = make_plan(loaded), tmp_path_factory.mktemp("summary") / "run"
+    with Record.create(folder, run_meta(loaded, plan)) as record:
+        engine = Engine(loaded.protocol, loaded.rig, open_devices(loaded), record, [].append)
+        engine.run(plan)
+        reduced = reduced_run(record, loaded)
+        fitted = fit_run(reduced, loaded)
+        return loaded, reduced, fitted, notes(reduced, fitted, record, loaded)
+
+
+def test_the_headline_names_the_model_and_the_verdict(results: Results) -> None:
+    _, _, fitted, _ = results
+    assert fitted.choice is not None
+    assert headline(fitted).startswith(f"{fitted.choice.chosen}: ")
+    assert headline(Fitted(None, fitted.used, "2 points are too few")) == (
+        "No model was fitted: 2 points are too few."
+    )
+
+
+def test_notes_name_the_simulation_the_tile_and_the_camera_s_rounding(results: Results) -> None:
+    found = results[3]
+    assert "all data are simulated" in found
+    assert "the white tile is assumed to be Lambertian" in found
+    assert any(note.startswith("8-bit camera: rounding frames") for note in found)
+
+
+def test_less_rounding_never_costs_u(results: Results) -> None:
+    _, reduced, fitted, _ = results
+    changes = u_without((ROUNDING, DARK), fitted, reduced)
+    assert changes
+    assert all(without <= u for u, without in changes.values())
+    same = u_without((), fitted, reduced)
+    assert all(without == u for u, without in same.values())
+
+
+def test_the_budget_shares_the_whole_variance(results: Results) -> None:
+    _, reduced, fitted, _ = results
+    rows = budget(reduced, fitted.u_brdf(reduced))
+    assert sum(share for _, _, share in rows) == pytest.approx(100.0)
+    assert [share for _, _, share in rows] == sorted((r[2] for r in rows), reverse=True)
+    assert np.all([u >= 0 for _, u, _ in rows])
+
+
+@pytest.mark.parametrize(
+    ("parameter", "text"),
+    [
+        (Parameter("sigma_deg", 20.013, 0.021, None, "°"), "20.013 ± 0.021\u00a0°"),
+        (Parameter("n", 1.5, None, (1.2, 2.0), ""), "not determined, within [1.2, 2]"),
+    ],
+)
+def test_a_parameter_has_its_u_or_its_interval(parameter: Parameter, text: str) -> None:
+    assert value_text(parameter) == text
