@@ -1,8 +1,8 @@
-"""Other programs for the same tasks, where they are installed: measured in the same run.
+"""Other programs for the same tasks, measured in the same run where they are installed.
 
-lmfit fits with the same model, data and start. pySCATMECH and Mitsuba bring Lambert's law: what
-their way of evaluating a BRDF costs. A program that is missing, or that does not work here, is a
-line on the page.
+lmfit fits the same model and data from the same start. pySCATMECH and Mitsuba evaluate Lambert's
+law, which shows the cost of their way of evaluating a BRDF. A program that is missing or does not
+work here becomes a line on the page.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ import numpy as np
 from instrument.geometry import Brdf, FloatArray, Geometry
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Peer:
-    """A program, its package and what it is measured at.
+    """Another program and the task that it is measured at.
 
-    `version` is None where it is missing; `problem` says why one that is there does not work.
+    `version` is None if it is missing; `problem` says why an installed one does not work.
     """
 
     name: str
     package: str
     task: str
     version: str | None
-    problem: str = ""
+    problem: str
 
     @property
     def line(self) -> str:
-        """What the page says of it."""
+        """Line of the page on this program."""
         if self.version is None:
             return (
                 f"{self.name}: not installed (pip install {self.package}); {self.task} not compared"
@@ -45,30 +45,31 @@ class Peer:
         return f"{self.name} {self.version}: {self.task}"
 
 
-_PEERS = (
-    ("lmfit", "lmfit", "lmfit", "the fit"),
-    ("pySCATMECH", "pySCATMECH", "pySCATMECH", "evaluating a BRDF, one geometry a call"),
-    ("Mitsuba", "mitsuba", "mitsuba", "evaluating a BRDF, many geometries a call"),
-)
+_PACKAGES_AND_TASKS = {
+    "lmfit": ("lmfit", "the fit"),
+    "pySCATMECH": ("pySCATMECH", "evaluating a BRDF, one geometry a call"),
+    "Mitsuba": ("mitsuba", "evaluating a BRDF, many geometries a call"),
+}
 
 
 def peers() -> tuple[Peer, ...]:
-    """All peers, installed or not."""
+    """Return all peers, installed or not."""
     found = []
-    for name, module, package, task in _PEERS:
-        version = _version(module, package)
-        found.append(Peer(name, package, task, version, _problem(name) if version else ""))
+    for name, (package, task) in _PACKAGES_AND_TASKS.items():
+        version = _version(package)
+        problem = _problem(name) if version else ""
+        found.append(Peer(name=name, package=package, task=task, version=version, problem=problem))
     return tuple(found)
 
 
 def installed(name: str) -> Peer | None:
-    """The peer of that name, or None where it is not installed or does not work."""
+    """Return the peer of that name, or None if it is not installed or does not work."""
     usable = (p for p in peers() if p.version is not None and not p.problem)
     return next((p for p in usable if p.name == name), None)
 
 
-def _version(module: str, package: str) -> str | None:
-    if find_spec(module) is None:
+def _version(package: str) -> str | None:
+    if find_spec(package) is None:
         return None
     try:
         return metadata.version(package)
@@ -78,21 +79,21 @@ def _version(module: str, package: str) -> str | None:
 
 @cache
 def _problem(name: str) -> str:
-    """What keeps an installed program from giving a right answer; empty where nothing does."""
+    """Reason why an installed program gives no right answer; empty if it gives one."""
     try:
         found, right = _PROBES[name]()
-    except Exception as error:  # noqa: BLE001 - whatever it dies of, the page says so
+    except Exception as error:  # noqa: BLE001 - any failure is reported on the page
         return f"{type(error).__name__}: {error}"
-    return "" if abs(found - right) < 1e-3 else f"{found:g} in place of {right:g}"
+    return "" if abs(found - right) < 1e-3 else f"{found:g} instead of {right:g}"
 
 
-def _fits_a_number() -> tuple[float, float]:
+def _probe_lmfit() -> tuple[float, float]:
     low, high = np.zeros(1), np.ones(1)
     found = lmfit_minimum(lambda x: np.array([x[0] - 0.25, 0.0]), np.array([0.5]), low, high)
     return float(found[0]), 0.25
 
 
-def _knows_lambert(make: Callable[[float], Brdf]) -> tuple[float, float]:
+def _probe_lambert(make: Callable[[float], Brdf]) -> tuple[float, float]:
     geometry = Geometry.from_degrees(theta_i=[30.0], theta_r=[50.0], dphi=[70.0])
     return float(make(0.5)(geometry)[0]), 0.5 / np.pi
 
@@ -103,22 +104,25 @@ def lmfit_minimum(
     low: FloatArray,
     high: FloatArray,
 ) -> FloatArray:
-    """Where lmfit's own default method (Levenberg-Marquardt in MINPACK) ends, within bounds."""
+    """Return the minimum, (parameters,), of lmfit's default method (Levenberg-Marquardt).
+
+    Start, bounds and result are in the units of the parameters; `residual` gives (N,) from them.
+    """
     lmfit: Any = importlib.import_module("lmfit")
     parameters = lmfit.Parameters()
     names = [f"x{n}" for n in range(start.size)]
     for name, value, least, most in zip(names, start, low, high, strict=True):
         parameters.add(name, float(value), min=float(least), max=float(most))
 
-    def of(now: Any) -> FloatArray:
+    def by_name(now: Any) -> FloatArray:
         return residual(np.array([now[name].value for name in names]))
 
-    found = lmfit.minimize(of, parameters)
+    found = lmfit.minimize(by_name, parameters)
     return np.array([found.params[name].value for name in names])
 
 
 def lambertian_peers(albedo: float) -> dict[str, Brdf]:
-    """Lambert's BRDF in 1/sr by the peers that are installed, by name."""
+    """Return Lambert's BRDF by the installed peers, by name: geometries and values (N,), 1/sr."""
     return {name: make(albedo) for name, make in _MAKERS.items() if installed(name) is not None}
 
 
@@ -127,7 +131,7 @@ def _scatmech(albedo: float) -> Brdf:
     model = module.BRDF_Model("Lambertian_BRDF_Model", reflectance=albedo)
 
     def brdf(geometry: Geometry) -> FloatArray:
-        phi = np.pi - np.radians(geometry.dphi_deg)  # counted from the mirror side
+        phi = np.pi - np.radians(geometry.dphi_deg)  # measured from the mirror side
         angles = zip(geometry.theta_i, geometry.theta_r, phi, strict=True)
         return np.array([model.BRDF(*map(float, angle)) for angle in angles])
 
@@ -146,7 +150,7 @@ def _mitsuba(albedo: float) -> Brdf:
         at = dr.zeros(mi.SurfaceInteraction3f, geometry.theta_i.size)
         at.wi = mi.Vector3f(*(mi.Float(a) for a in to_lamp))
         seen = bsdf.eval(mi.BSDFContext(), at, mi.Vector3f(*(mi.Float(a) for a in to_camera)))
-        # Mitsuba's value has the cosine of the outgoing direction in it.
+        # Mitsuba's value includes the cosine of the outgoing direction.
         red = np.asarray(seen, dtype=np.float64).reshape(3, -1)[0]
         return np.asarray(red / cos_r)
 
@@ -160,6 +164,6 @@ def _direction(theta: FloatArray, phi: FloatArray | float) -> tuple[FloatArray, 
 
 _MAKERS: dict[str, Callable[[float], Brdf]] = {"pySCATMECH": _scatmech, "Mitsuba": _mitsuba}
 _PROBES: dict[str, Callable[[], tuple[float, float]]] = {
-    "lmfit": _fits_a_number,
-    **{name: partial(_knows_lambert, make) for name, make in _MAKERS.items()},
+    "lmfit": _probe_lmfit,
+    **{name: partial(_probe_lambert, make) for name, make in _MAKERS.items()},
 }

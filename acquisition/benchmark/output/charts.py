@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from acquisition.benchmark.number_text import short
 from acquisition.benchmark.output.axes_grid import axes_grid
-from acquisition.benchmark.output.labels import Box, place
+from acquisition.benchmark.output.labels import Box, Placed, place
 from acquisition.benchmark.study import Study
 from acquisition.benchmark.trial import Trial, pareto_front
 from analysis.report.style import GREY, INK, style_of, svg_of
@@ -88,37 +89,21 @@ def _panel(
 ) -> None:
     """Draw one scene; the `first` panel of a row has the numbers of the error axis."""
     trials = study.in_scene(scene)
+    shown = [_clipped(t, limits) for t in trials]
+    front = [_clipped(t, limits) for t in pareto_front(trials)]
     _scale(ax, study, limits)
-    _front(ax, trials, limits)
+    _draw_front(ax, front)
     for number, series in enumerate(study.series):
-        own = [t for t in trials if t.series == series]
+        own = [t for t in shown if t.series == series]
         if study.joined:
-            _join(ax, own, number)
+            colour, _, dashes = style_of(number)
+            x, y = [t.cost for t in own], [t.error for t in own]
+            ax.plot(x, y, color=colour, linestyle=dashes, linewidth=1.0, zorder=2)
         for trial in own:
-            _mark(ax, trial, number, limits)
-    _name(ax, study, trials, limits)
+            _mark(ax, trial, number)
+    _write_labels(ax, study, shown, front)
     if first and any(t.error == 0 for t in trials):
         ax.text(-0.015, 0, "0", transform=ax.transAxes, ha="right", va="center", size=9, color=INK)
-
-
-def _scale(ax: Axes, study: Study, limits: tuple[float, float]) -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
-    costs = [t.cost for t in study.trials]
-    few = math.log10(max(costs) / min(costs)) < 1.5
-    room = 1.4 if few else 3.0
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    ax.set_xlim(min(costs) / room, max(costs) * room)
-    ax.set_ylim(*limits)
-    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=12))
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: short(x)))
-    close = limits[1] < 100 * limits[0]
-    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if close else (1.0,), numticks=9))
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: short(y)))
-    ax.tick_params(labelsize=9)
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_minor_locator(NullLocator())
 
 
 def _limits(trials: Sequence[Trial]) -> tuple[float, float]:
@@ -131,97 +116,102 @@ def _limits(trials: Sequence[Trial]) -> tuple[float, float]:
     return low / room / for_zero, high * room
 
 
-def _within(value: float, limits: tuple[float, float]) -> float:
-    return min(max(value, limits[0]), limits[1])
+def _clipped(trial: Trial, limits: tuple[float, float]) -> Trial:
+    """Move errors outside the axis to its ends, and the median to the error at most."""
+    low, high = limits
+    error = min(max(trial.error, low), high)
+    return replace(trial, error=error, error_median=min(max(trial.error_median, low), error))
 
 
-def _front(ax: Axes, trials: Sequence[Trial], limits: tuple[float, float]) -> None:
-    front = pareto_front(trials)
-    if not front:
-        return
-    x = [front[0].cost, *(t.cost for t in front), ax.get_xlim()[1]]
-    y = [limits[1], *(_within(t.error, limits) for t in front)]
-    ax.plot(x, [*y, y[-1]], drawstyle="steps-post", **_FRONT)
+def _scale(ax: Axes, study: Study, limits: tuple[float, float]) -> None:
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    costs = [t.cost for t in study.trials]
+    few = math.log10(max(costs) / min(costs)) < 1.5
+    room = 1.4 if few else 3.0
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xlim(min(costs) / room, max(costs) * room)
+    ax.set_ylim(*limits)
+    ax.tick_params(labelsize=9)
+    close = limits[1] < 100 * limits[0]
+    for axis, fine, ticks in ((ax.xaxis, few, 12), (ax.yaxis, close, 9)):
+        subs = (1.0, 2.0, 5.0) if fine else (1.0,)
+        axis.set_major_locator(LogLocator(subs=subs, numticks=ticks))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: short(value)))
+        axis.set_minor_locator(NullLocator())
 
 
-def _join(ax: Axes, own: Sequence[Trial], number: int) -> None:
-    colour, _, dashes = style_of(number)
-    x, y = [t.cost for t in own], [t.error for t in own]
-    ax.plot(x, y, color=colour, linestyle=dashes, linewidth=1.0, zorder=2)
+def _draw_front(ax: Axes, front: Sequence[Trial]) -> None:
+    if front:
+        x = [front[0].cost, *(t.cost for t in front), ax.get_xlim()[1]]
+        y = [ax.get_ylim()[1], *(t.error for t in front), front[-1].error]
+        ax.plot(x, y, drawstyle="steps-post", **_FRONT)
 
 
-def _mark(ax: Axes, trial: Trial, number: int, limits: tuple[float, float]) -> None:
+def _mark(ax: Axes, trial: Trial, number: int) -> None:
     colour, marker, _ = style_of(number)
-    error = _within(trial.error, limits)
+    x, y, low = trial.cost, trial.error, trial.error_median
     if trial.bound:
-        ax.plot(trial.cost, error, ls="", marker="_", ms=8, mew=1.4, c=colour, zorder=3)
+        ax.plot(x, y, ls="", marker="_", ms=8, mew=1.4, c=colour, zorder=3)
         return
-    low = min(_within(trial.error_median, limits), error)
-    ax.plot([trial.cost] * 2, [low, error], color=colour, linewidth=0.8, zorder=2)
-    ax.plot(trial.cost, low, ls="", marker="_", ms=4, c=colour, zorder=2)
-    fill = "white" if trial.peer else colour
-    marker = _PEER if trial.peer else marker
-    ax.plot(
-        trial.cost, error, ls="", marker=marker, ms=6, c=colour, mfc=fill, mew=1.3, zorder=4,
-        clip_on=False,
-    )  # fmt: skip
+    ax.plot([x, x], [low, y], color=colour, linewidth=0.8, zorder=2)
+    ax.plot(x, low, ls="", marker="_", ms=4, c=colour, zorder=2)
+    style: dict[str, Any] = {"ls": "", "mew": 1.3, "clip_on": False}
+    fill, marker = ("white", _PEER) if trial.peer else (colour, marker)
+    ax.plot(x, y, marker=marker, ms=6, c=colour, mfc=fill, zorder=4, **style)
     if trial.default:
-        _ring(ax, trial.cost, error)
+        ax.plot(x, y, marker="o", ms=13, c=INK, mfc="none", zorder=5, **style)
 
 
-def _ring(ax: Axes, x: float, y: float) -> None:
-    ax.plot(x, y, ls="", marker="o", ms=13, mfc="none", c=INK, mew=1.3, zorder=5, clip_on=False)
-
-
-def _name(ax: Axes, study: Study, trials: Sequence[Trial], limits: tuple[float, float]) -> None:
+def _write_labels(ax: Axes, study: Study, trials: Sequence[Trial], front: Sequence[Trial]) -> None:
     """Write labels beside the marks, with a thin line to those that have no room next to theirs."""
-    marks = [_at(ax, t.cost, _within(t.error, limits)) for t in trials]
+    marks = [_points(ax, t.cost, t.error) for t in trials]
     texts = [_label(t, study, trials) for t in trials]
-    left, bottom = _at(ax, ax.get_xlim()[0], limits[0])
-    right, top = _at(ax, ax.get_xlim()[1], limits[1])
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    left, bottom = _points(ax, left, bottom)
+    right, top = _points(ax, right, top)
     frame = Box(left + 1, bottom + 1, right - 1, top - 1)
-    found = place(marks, texts, frame, _SIZE, _lines(ax, trials, limits))
+    found = place(marks, texts, frame, _SIZE, _obstacles(ax, trials, front))
     for mark, text, trial, placed in zip(marks, texts, trials, found, strict=True):
         if text:
-            weight = "bold" if trial.default else "normal"
-            _write(ax, mark, placed.box, text, placed.far, weight)
+            _write(ax, mark, placed, text, "bold" if trial.default else "normal")
 
 
-def _at(ax: Axes, x: float, y: float) -> tuple[float, float]:
+def _points(ax: Axes, x: float, y: float) -> tuple[float, float]:
     """Convert data coordinates to points of the figure."""
     to_points = ax.transData - ax.figure.dpi_scale_trans
     at = 72 * to_points.transform((x, y))
     return float(at[0]), float(at[1])
 
 
-def _lines(ax: Axes, trials: Sequence[Trial], limits: tuple[float, float]) -> list[Box]:
+def _obstacles(ax: Axes, trials: Sequence[Trial], front: Sequence[Trial]) -> list[Box]:
     """Boxes that labels avoid: rings, the lines to the medians, the front."""
     boxes = []
     for t in trials:
-        x, y = _at(ax, t.cost, _within(t.error, limits))
+        x, y = _points(ax, t.cost, t.error)
         if t.default:
             boxes.append(Box(x - 8, y - 8, x + 8, y + 8))
-        low = _at(ax, t.cost, min(_within(t.error_median, limits), _within(t.error, limits)))[1]
-        boxes.append(Box(x - 1, low, x + 1, y))
-    front = [_at(ax, t.cost, _within(t.error, limits)) for t in pareto_front(trials)]
+        boxes.append(Box(x - 1, _points(ax, t.cost, t.error_median)[1], x + 1, y))
     if not front:
         return boxes
-    right, top = _at(ax, ax.get_xlim()[1], limits[1])
-    boxes.append(Box(front[0][0] - 1, front[0][1], front[0][0] + 1, top))
-    for (x, y), (to_x, to_y) in zip(front, [*front[1:], (right, front[-1][1])], strict=True):
+    corners = [_points(ax, t.cost, t.error) for t in front]
+    right, top = _points(ax, ax.get_xlim()[1], ax.get_ylim()[1])
+    (x, y), end = corners[0], (right, corners[-1][1])
+    boxes.append(Box(x - 1, y, x + 1, top))
+    for (x, y), (to_x, to_y) in zip(corners, [*corners[1:], end], strict=True):
         boxes += [Box(x, y - 1, to_x, y + 1), Box(to_x - 1, to_y, to_x + 1, y)]
     return boxes
 
 
-def _write(
-    ax: Axes, mark: tuple[float, float], box: Box, text: str, far: bool, weight: str
-) -> None:
+def _write(ax: Axes, mark: tuple[float, float], placed: Placed, text: str, weight: str) -> None:
+    box = placed.box
     line = {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 4}
     ax.annotate(
         text, xy=mark, xycoords="figure points",
         xytext=((box.left + box.right) / 2, (box.bottom + box.top) / 2),
         textcoords="figure points", ha="center", va="center_baseline", size=_SIZE, color=INK,
-        weight=weight, zorder=6, arrowprops=line if far else None, annotation_clip=False,
+        weight=weight, zorder=6, arrowprops=line if placed.far else None, annotation_clip=False,
         bbox={"fc": "white", "ec": "none", "pad": 0.4, "alpha": 0.75},
     )  # fmt: skip
 
@@ -237,28 +227,21 @@ def _label(trial: Trial, study: Study, trials: Sequence[Trial]) -> str:
 
 
 def _series_legend(study: Study) -> list[Line2D]:
-    from matplotlib.lines import Line2D
-
     handles = []
     for number, series in enumerate(study.series):
         colour, marker, dashes = style_of(number)
         own = [t for t in study.trials if t.series == series]
         peer = all(t.peer for t in own)
-        fill = "white" if peer else colour
         shape = "_" if all(t.bound for t in own) else _PEER if peer else marker
-        line = dashes if study.joined else ""
-        handles.append(
-            Line2D([], [], ls=line, marker=shape, ms=6, c=colour, mfc=fill, mew=1.3, label=series)
-        )
+        line, fill = dashes if study.joined else "", "white" if peer else colour
+        handles.append(_sign(series, ls=line, marker=shape, ms=6, c=colour, mfc=fill, mew=1.3))
     return handles + _signs(error_is=study.error_is)
 
 
 def _signs(error_is: str = "worst", peer: bool = False) -> list[Line2D]:
     """Legend entries of the front, the ring and the thin line."""
-    from matplotlib.lines import Line2D
-
     found = [
-        Line2D([], [], label="Pareto front", **_FRONT),
+        _sign("Pareto front", ls="-", c=_FRONT["color"], lw=_FRONT["linewidth"]),
         _sign("program’s default", marker="o", ms=10, mfc="none", mew=1.3),
         _sign(f"{error_is} (mark) to median", marker="|", ms=11, c=GREY),
     ]

@@ -47,36 +47,31 @@ def place(
     size: float,
     taken: Sequence[Box] = (),
 ) -> list[Placed]:
-    """Place each text near its mark (points), the most crowded first; "" needs no place.
+    """Place each text near its mark (points), the most crowded first; "" takes no room.
 
     Of all candidates the one that covers least is taken, and of those the nearest.
     """
     obstacles = [*taken, *(Box(x - 5, y - 5, x + 5, y + 5) for x, y in marks)]
-    order = sorted(range(len(marks)), key=lambda n: -_crowd(n, marks))
-    placed: dict[int, Placed] = {}
-    for n in order:
-        if not texts[n]:
-            placed[n] = Placed(Box(*marks[n], *marks[n]), False)
-            continue
-        best, far = _best(marks[n], text_size(texts[n], size), frame, obstacles)
-        obstacles.append(best)
-        placed[n] = Placed(best, far)
-    return [placed[n] for n in range(len(marks))]
+    placed = [Placed(Box(*mark, *mark), False) for mark in marks]
+    for n in sorted(range(len(marks)), key=lambda n: -_crowd(n, marks)):
+        if texts[n]:
+            placed[n] = _best(marks[n], text_size(texts[n], size), frame, obstacles)
+            obstacles.append(placed[n].box)
+    return placed
 
 
 def _best(
     mark: tuple[float, float], size: tuple[float, float], frame: Box, obstacles: Sequence[Box]
-) -> tuple[Box, bool]:
-    found: list[tuple[float, int, Box, bool]] = []
+) -> Placed:
+    found: list[tuple[float, int, Placed]] = []
     for ring in _RINGS:
         for direction in _DIRECTIONS:
             box = _at(mark, size, ring, direction)
             covered = 4 * box.outside(frame) + sum(box.shared(other) for other in obstacles)
-            found.append((covered, len(found), box, ring > _NEAR))
+            found.append((covered, len(found), Placed(box, ring > _NEAR)))
         if min(found)[0] == 0:
             break
-    _, _, box, far = min(found)
-    return box, far
+    return min(found)[2]
 
 
 def _at(mark: tuple[float, float], size: tuple[float, float], ring: float, degrees: int) -> Box:

@@ -17,7 +17,6 @@ body { max-width: 1100px; }
 figcaption { color: var(--ink); font-size: 15px; }
 details { margin: 6px 0 18px; }
 summary { cursor: pointer; color: var(--soft); font-size: 14px; }
-td.default { font-weight: 700; }
 tr.scene td { background: var(--wash); font-weight: 600; }
 """
 _GUIDE = (

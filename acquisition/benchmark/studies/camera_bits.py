@@ -83,76 +83,71 @@ def _label(bits: int, frames: int) -> str:
 
 
 def _trial(scene: Scene, bits: int, frames: int, draws: int) -> Trial:
+    sensor = _sensor(scene, bits)
     return Trial(
         study="camera_bits",
         scene=scene.name,
         series=f"{bits} bit",
         label=_label(bits, frames),
-        cost=frames * (_EXPOSURE_S + _camera().frame_overhead_s),
+        cost=frames * (_EXPOSURE_S + sensor.frame_overhead_s),
         default=(bits, frames) == DEFAULT,
-        more={"u_rounding_relative": _u_rounding(scene, bits)},
-        **rms_and_median(reading_errors(scene, bits, frames, draws)),
+        more={"u_rounding_relative": _u_rounding(scene, sensor)},
+        **rms_and_median(reading_errors(scene, sensor, frames, draws)),
     )
 
 
-def _camera() -> CameraConfig:
-    return shipped_demo().rig.camera
+def _sensor(scene: Scene, bits: int) -> CameraConfig:
+    """Return the demonstration's camera with other bits, and the scene's read noise."""
+    camera = shipped_demo().rig.camera
+    black = camera.black_level_dn / camera.max_dn * (2**bits - 1)
+    noise = scene.read_noise_electrons
+    return camera.model_copy(
+        update={"bit_depth": bits, "black_level_dn": black, "read_noise_electrons": noise}
+    )
 
 
 def _dark_frames() -> int:
     return shipped_demo().protocol.dark_frames
 
 
-def _u_rounding(scene: Scene, bits: int) -> float:
+def _u_rounding(scene: Scene, sensor: CameraConfig) -> float:
     """Relative uncertainty that the program states for rounding, of light and dark together."""
-    gain, electrons = _electrons_per_dn(bits), scene.level * _camera().full_well_electrons
-    noise2 = scene.read_noise_electrons**2
+    gain, electrons = sensor.electrons_per_dn, scene.level * sensor.full_well_electrons
+    noise2 = sensor.read_noise_electrons**2
     both = [rounding_u_dn(variance / gain**2) for variance in (electrons + noise2, noise2)]
     return math.hypot(*both) * gain / electrons
 
 
-def reading_errors(scene: Scene, bits: int, frames: int, draws: int) -> FloatArray:
+def reading_errors(scene: Scene, sensor: CameraConfig, frames: int, draws: int) -> FloatArray:
     """Return the relative errors, (draws,), of the mean minus the dark.
 
     The light levels of the draws differ by up to a count, so that rounding affects each
     differently.
     """
-    random = np.random.default_rng([bits, frames, round(1e4 * scene.level)])
-    gain, full_well = _electrons_per_dn(bits), _camera().full_well_electrons
-    levels = scene.level * full_well + gain * random.uniform(-0.5, 0.5, draws)
-    black = _black_fraction() * (2**bits - 1) + random.uniform(-0.5, 0.5, draws)
+    random = np.random.default_rng([sensor.bit_depth, frames, round(1e4 * scene.level)])
+    gain = sensor.electrons_per_dn
+    levels = scene.level * sensor.full_well_electrons + gain * random.uniform(-0.5, 0.5, draws)
+    black = sensor.black_level_dn + random.uniform(-0.5, 0.5, draws)
     found = np.empty(draws)
     for n, (electrons, offset) in enumerate(zip(levels, black, strict=True)):
-        light = _mean_dn(random, electrons, offset, scene, bits, frames)
-        dark = _mean_dn(random, 0.0, offset, scene, bits, _dark_frames())
+        light = _mean_dn(random, sensor, electrons, offset, frames)
+        dark = _mean_dn(random, sensor, 0.0, offset, _dark_frames())
         found[n] = (light - dark) * gain / electrons - 1
     return found
 
 
-def _black_fraction() -> float:
-    """Black level of the demonstration's camera as a fraction of full scale."""
-    return _camera().black_level_dn / _camera().max_dn
-
-
-def _electrons_per_dn(bits: int) -> float:
-    counts = float(2**bits - 1) * (1 - _black_fraction())
-    return _camera().full_well_electrons / counts
-
-
 def _mean_dn(
     random: np.random.Generator,
+    sensor: CameraConfig,
     electrons: float,
     black_dn: float,
-    scene: Scene,
-    bits: int,
     frames: int,
 ) -> float:
     """Mean count of all pixels and frames."""
-    shape = (frames, PIXELS)
-    gain = _electrons_per_dn(bits)
-    noise_dn = math.sqrt(electrons + scene.read_noise_electrons**2) / gain
-    counts = random.standard_normal(shape, dtype=np.float32)
+    gain = sensor.electrons_per_dn
+    noise_dn = math.sqrt(electrons + sensor.read_noise_electrons**2) / gain
+    counts = random.standard_normal((frames, PIXELS), dtype=np.float32)
     counts *= np.float32(noise_dn)
     counts += np.float32(electrons / gain + black_dn)
-    np.clip(np.rint(counts, out=counts), 0, 2**bits - 1, out=counts)
+    np.clip(np.rint(counts, out=counts), 0, sensor.max_dn, out=counts)
     return float(np.mean(counts, dtype=np.float64))

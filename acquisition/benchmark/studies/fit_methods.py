@@ -192,7 +192,7 @@ def _misses_caption(trials: Sequence[Trial]) -> str:
     return (
         f"With its own starts the program misses {sum(t.failures for t in own)} of "
         f"{sum(t.attempts for t in own)} scans.\nFrom random starts over the whole domain, with 5 "
-        f"parameters, the part that misses is: {', '.join(words)}."
+        f"parameters, these parts miss it: {', '.join(words)}."
     )
 
 

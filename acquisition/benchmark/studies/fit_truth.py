@@ -93,7 +93,7 @@ class Optimum:
     per_u: FloatArray
 
     def distance_u(self, x: FloatArray) -> float:
-        """Return the distance of `x`, (parameters,), in standard uncertainties; inf if NaN."""
+        """Return the distance of `x`, (parameters,) in their units, in standard uncertainties."""
         if not np.all(np.isfinite(x)):
             return math.inf
         return float(np.linalg.norm(self.per_u @ (x - self.x)))

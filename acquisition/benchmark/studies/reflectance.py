@@ -191,7 +191,7 @@ def _wolff_caption(trials: Sequence[Trial]) -> str:
     times = float(np.median([t.cost for t in order])) / exact
     return (
         "H and K are kept as series in the cosine, so that they cost as much as a product of a few "
-        f"factors. H of order 16, kept in the same way, takes {rounded(times)} times the time of "
+        f"factors. H of order 16, kept in the same way, takes {rounded(times)} times as long as "
         f"the exact one and is still off by up to {percent(max(t.error for t in order))}.\n"
         f"Wolff’s polynomial for F is off by up to {percent(max(t.error for t in polynomial))} at "
         "oblique angles, whichever H is used, and saves next to nothing."

@@ -60,17 +60,6 @@ TARGETS: tuple[float, ...] = (0.05, 0.2, 0.4)
 _QUICK = VIEWS[1:2], FRAMES[:1], TARGETS[:1]
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
-    """Errors of the parameters relative to the truth and the stated relative u.
-
-    Both are (seeds, parameters), in the order of `_WORDS`.
-    """
-
-    errors: FloatArray
-    stated: FloatArray
-
-
 def variants(thorough: bool) -> list[tuple[str, str, Settings]]:
     """Return series, label and settings: the demonstration, then one setting changed at a time."""
     views, frames, targets = (VIEWS, FRAMES, TARGETS) if thorough else _QUICK
@@ -88,7 +77,7 @@ def scan_study(effort: Effort) -> Study:
     with TemporaryDirectory(prefix="gonio-bench-") as folder:
         for series, label, settings in variants(effort.thorough):
             found = simulated(settings, effort.seeds, Path(folder) / label)
-            trials += _trials(series, label, settings, found)
+            trials += _trials(series, label, settings, *found)
     return Study(
         name="scan",
         title="Scan: what more angles, frames and light bring",
@@ -129,8 +118,8 @@ def _caption(trials: Sequence[Trial]) -> str:
     minutes = own[_WORDS["sigma_deg"]].cost
     return (
         f"The demonstration states a u of {reached}, in {rounded(minutes)} minutes. The albedo’s u "
-        "is mostly shared by all points (tile, lamp, placement): other settings change it to only "
-        f"{change} times.\nThe roughness’s stated u, in comparison: {words}."
+        "is mostly shared by all points (tile, lamp, placement): other settings change it by "
+        f"factors of only {change}.\nThe roughness’s stated u, in comparison: {words}."
     )
 
 
@@ -143,8 +132,12 @@ def _ends(trials: Sequence[Trial]) -> list[Trial]:
     return ends
 
 
-def simulated(settings: Settings, seeds: int, folder: Path) -> Found:
-    """Scan, reduce and fit with the sample's own model, once for each seed."""
+def simulated(settings: Settings, seeds: int, folder: Path) -> tuple[FloatArray, FloatArray]:
+    """Scan, reduce and fit with the sample's own model, once for each seed.
+
+    Returns the errors of the parameters and their stated u, both relative to the truth, as
+    (seeds, parameters) in the order of `_WORDS`.
+    """
     errors, stated = [], []
     for seed in range(1, seeds + 1):
         loaded = demonstration(**asdict(settings), seed=seed)
@@ -152,7 +145,7 @@ def simulated(settings: Settings, seeds: int, folder: Path) -> Found:
         truth = _sample(loaded).parameters
         errors.append([values[name] / truth[name] - 1 for name in _WORDS])
         stated.append([u[name] / truth[name] for name in _WORDS])
-    return Found(np.array(errors), np.array(stated))
+    return np.array(errors), np.array(stated)
 
 
 def _sample(loaded: Loaded) -> SimulatedSample:
@@ -211,13 +204,15 @@ def _noise(brdf: FloatArray, geometry: Geometry, loaded: Loaded, plan: Plan) -> 
     return np.asarray(np.sqrt(variance / counted) / electrons)
 
 
-def _trials(series: str, label: str, settings: Settings, found: Found) -> list[Trial]:
+def _trials(
+    series: str, label: str, settings: Settings, errors: FloatArray, stated_u: FloatArray
+) -> list[Trial]:
     loaded = demonstration(**asdict(settings))
     plan = make_plan(loaded)
     truth, photons = _sample(loaded).parameters, photon_limit(loaded, plan)
     trials: list[Trial] = []
     for column, (name, scene) in enumerate(_WORDS.items()):
-        errors, stated = found.errors[:, column], float(np.median(found.stated[:, column]))
+        own_errors, stated = errors[:, column], float(np.median(stated_u[:, column]))
         own = Trial(
             study="scan",
             scene=scene,
@@ -226,12 +221,12 @@ def _trials(series: str, label: str, settings: Settings, found: Found) -> list[T
             cost=plan.duration_s / 60,
             default=settings == DEFAULT,
             more={
-                "bias_relative": float(errors.mean()),
-                "u_bias_relative": float(errors.std(ddof=1) / math.sqrt(errors.size)),
+                "bias_relative": float(own_errors.mean()),
+                "u_bias_relative": float(own_errors.std(ddof=1) / math.sqrt(own_errors.size)),
                 _STATED: stated,
                 "geometries": float(len(plan.points)),
             },
-            **rms_and_median(errors),
+            **rms_and_median(own_errors),
         )
         limits = {_PHOTONS: photons[name] / truth[name], "all parts of u": stated}
         trials += [own, *(_limit(own, what, value) for what, value in limits.items())]

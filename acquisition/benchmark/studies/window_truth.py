@@ -46,7 +46,7 @@ def radiance(points_mm: FloatArray) -> FloatArray:
 
 
 def patch_mean(quantity: Callable[[FloatArray], FloatArray], side_mm: float) -> float:
-    """Return the mean of a quantity of points in mm over a square patch, by Gauss-Legendre."""
+    """Return the mean of a quantity of points (..., 2) in mm over a square patch, by quadrature."""
     t, w = np.polynomial.legendre.leggauss(60)
     points = np.stack(np.meshgrid(t * side_mm / 2, t * side_mm / 2), axis=-1)
     return float(w @ quantity(points) @ w / 4)
