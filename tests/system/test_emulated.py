@@ -1,4 +1,4 @@
-"""The whole scan with real drivers over emulated devices: the same results as the simulation."""
+"""Whole scans with the real drivers over emulated devices."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TRUTH = {"albedo": 0.80, "sigma_deg": 20.0, "ks": 0.076}
 
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The demo's with two incidences and nine view angles."""
+    """The demonstration with two incidences and nine view angles."""
     return small_demo(tmp_path_factory.mktemp("protocol"))
 
 
@@ -41,26 +41,28 @@ def run(tmp_path_factory: pytest.TempPathFactory, protocol: Path) -> Path:
     return folder
 
 
-def test_the_truth_comes_back_within_its_uncertainty(run: Path) -> None:
+def test_the_fit_recovers_the_true_parameters_within_their_uncertainty(run: Path) -> None:
     fit = json.loads((run / "fit.json").read_text())
     assert (fit["chosen"], fit["verdict"]) == ("oren_nayar+torrance_sparrow", "adequate")
-    found = next(c for c in fit["candidates"] if c["model"] == fit["chosen"])["parameters"]
+    fitted = next(c for c in fit["candidates"] if c["model"] == fit["chosen"])["parameters"]
     for name, true in TRUTH.items():
-        assert abs(found[name]["value"] - true) < 4 * found[name]["u"], name
+        assert abs(fitted[name]["value"] - true) < 4 * fitted[name]["u"], name
 
 
-def test_each_point_agrees_with_the_simulation(run: Path, tmp_path: Path, protocol: Path) -> None:
-    """The same optics and lamp, simulated: what differs is noise, drift and the angles' errors."""
-    plain = tmp_path / "plain.yaml"
-    plain.write_text(simulated(RIG.read_text()))
-    done = gonio_here("run", protocol, "--rig", plain, "--out", tmp_path / "run")
+def test_each_point_agrees_with_the_simulated_rig(
+    run: Path, tmp_path: Path, protocol: Path
+) -> None:
+    """With the same optics and lamp only noise, drift and angle errors differ."""
+    simulated_rig = tmp_path / "simulated.yaml"
+    simulated_rig.write_text(simulated(RIG.read_text()))
+    done = gonio_here("run", protocol, "--rig", simulated_rig, "--out", tmp_path / "run")
     assert done.returncode == 0, done.stderr
-    ours, theirs = points(run), points(tmp_path / "run")
-    assert ours.keys() == theirs.keys()
-    apart = [(f - g) / (u**2 + v**2) ** 0.5 for (f, u), (g, v) in
-             ((ours[k], theirs[k]) for k in ours)]  # fmt: skip
-    assert max(map(abs, apart)) < 4.5
-    assert sum(x * x for x in apart) / len(apart) < 1.5
+    first, second = points(run), points(tmp_path / "run")
+    assert first.keys() == second.keys()
+    deviations = [(f - g) / (u**2 + v**2) ** 0.5 for (f, u), (g, v) in
+                  ((first[k], second[k]) for k in first)]  # fmt: skip
+    assert max(map(abs, deviations)) < 4.5
+    assert sum(d * d for d in deviations) / len(deviations) < 1.5
 
 
 def simulated(text: str) -> str:
@@ -85,7 +87,7 @@ def points(folder: Path) -> dict[tuple[float, ...], tuple[float, float]]:
         }  # fmt: skip
 
 
-def test_the_record_says_who_answered_and_when_each_frame_was_taken(run: Path) -> None:
+def test_the_record_holds_the_devices_identities_and_the_frames_times(run: Path) -> None:
     with sqlite3.connect(f"file:{run / 'record.sqlite'}?mode=ro", uri=True) as record:
         devices = dict(record.execute("SELECT role, identity FROM device"))
         frames = record.execute(
@@ -102,22 +104,24 @@ def test_the_record_says_who_answered_and_when_each_frame_was_taken(run: Path) -
     assert all(0 <= read - stamp < 0.5 for _, read, stamp in frames)
 
 
-def test_a_stopped_scan_goes_on_where_it_was(tmp_path: Path, protocol: Path) -> None:
+def test_a_stopped_scan_is_resumed_where_it_ended(tmp_path: Path, protocol: Path) -> None:
     folder, rig = tmp_path / "run", tmp_path / "rig.yaml"
-    rig.write_text(RIG.read_text().replace("homing_s: 2.0", "homing_s: 0.2"))  # homed twice here
+    rig.write_text(
+        RIG.read_text().replace("homing_s: 2.0", "homing_s: 0.2")
+    )  # homed twice in this test
     command = [sys.executable, "-m", "acquisition", "run", str(protocol),
                "--rig", str(rig), "--out", str(folder)]  # fmt: skip
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL,
                           stdout=subprocess.DEVNULL, text=True) as scanning:  # fmt: skip
         wait_for_readings(folder, 5)
         scanning.send_signal(signal.SIGTERM)
-        _, said = scanning.communicate(timeout=60)
+        _, stderr = scanning.communicate(timeout=60)
     assert scanning.returncode == 4
-    assert f"gonio resume {folder}" in said
+    assert f"gonio resume {folder}" in stderr
     done = gonio("resume", folder, "--yes", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["verdict"] == "adequate"
-    assert len(points(folder)) == 17  # in one, camera and lamp hide one another
+    assert len(points(folder)) == 17  # in the eighteenth, camera and lamp obstruct each other
 
 
 def wait_for_readings(folder: Path, count: int) -> None:
@@ -128,19 +132,19 @@ def wait_for_readings(folder: Path, count: int) -> None:
                 if record.execute("SELECT COUNT(*) FROM reading").fetchone()[0] >= count:
                     return
         except sqlite3.Error:
-            pass  # not there yet
+            pass  # does not exist yet
         time.sleep(0.01)
-    raise AssertionError("the scan did not get that far")
+    raise AssertionError(f"fewer than {count} readings after 60 s")
 
 
-def test_the_rig_s_devices_say_who_they_are() -> None:
+def test_devices_lists_the_identity_of_every_device() -> None:
     done = gonio("devices", "--rig", RIG)
     assert done.returncode == 0, done.stderr
     for word in ("SMC100", "Oriental Motor AZ", "Zaber device", "Y16 320 x 256 pixels"):
         assert word in done.stdout
 
 
-def test_a_frame_of_the_emulated_camera(tmp_path: Path) -> None:
+def test_grab_takes_a_frame_with_the_emulated_camera(tmp_path: Path) -> None:
     done = gonio(
         "grab", "--rig", RIG, "-o", tmp_path / "aim.png", "--exposure-s", "0.001", "--json"
     )
@@ -148,13 +152,13 @@ def test_a_frame_of_the_emulated_camera(tmp_path: Path) -> None:
     assert json.loads(done.stdout)["window_mean_dn"] > 200
 
 
-def test_an_emulated_axis_is_homed_and_moved() -> None:
+def test_move_homes_and_moves_an_emulated_axis() -> None:
     done = gonio("move", "dphi", "30", "--rig", RIG)
     assert done.returncode == 0, done.stderr
     assert float(done.stdout.split()[-2]) == pytest.approx(30.0, abs=0.01)
 
 
-def test_without_a_compiler_the_emulated_rig_says_so(tmp_path: Path) -> None:
+def test_a_missing_compiler_is_reported_before_the_run_folder_is_made(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "acquisition", "run", "configs/protocols/demo.yaml", "--rig",
          str(RIG), "--out", str(tmp_path / "run")],

@@ -1,4 +1,4 @@
-"""Every command and every example in the README works."""
+"""Every command and example in the README works."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ def _blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
 
 
-def test_the_commands_run_in_their_order(tmp_path: Path) -> None:
+def test_the_commands_succeed_in_the_order_given(tmp_path: Path) -> None:
     shutil.copytree(CONFIGS, tmp_path / "configs")
     commands = [line for block in _blocks("sh") for line in block.splitlines()]
     gonio = [line.split()[1:] for line in commands if line.startswith("gonio ")]
     assert len(gonio) >= 4
     for arguments in gonio:
-        if arguments[0] == "bench":  # takes minutes: what it does is in `test_bench`
-            arguments = ["bench", "--help"]  # noqa: PLW2901 - the same command, shown
+        if arguments[0] == "bench":  # takes minutes; tested in `tests/acquisition/benchmark`
+            arguments = ["bench", "--help"]  # noqa: PLW2901 - only its help
         done = gonio_here(*arguments, cwd=tmp_path)
         assert done.returncode == 0, (arguments, done.stderr)
 
 
-def test_its_make_targets_exist() -> None:
+def test_the_make_targets_exist() -> None:
     makefile = (ROOT / "Makefile").read_text()
     targets = re.findall(r"^make (\w+)$", "\n".join(_blocks("sh")), flags=re.MULTILINE)
     assert targets == ["demo", "test"]
     assert all(re.search(rf"^{target}:", makefile, flags=re.MULTILINE) for target in targets)
 
 
-def test_its_protocol_is_sound(tmp_path: Path) -> None:
+def test_the_protocol_is_valid(tmp_path: Path) -> None:
     (block,) = _blocks("yaml")
     path = tmp_path / "protocol.yaml"
     path.write_text(block)
@@ -46,7 +46,7 @@ def test_its_protocol_is_sound(tmp_path: Path) -> None:
     assert loaded.protocol.name == "plaster"
 
 
-def test_its_python_runs() -> None:
+def test_the_python_example_runs() -> None:
     (block,) = _blocks("python")
     done = subprocess.run([sys.executable, "-c", block], check=False, capture_output=True)
     assert done.returncode == 0, done.stderr

@@ -1,7 +1,7 @@
-"""The paper's samples, measured on the simulated rigs, come back as they were put in.
+"""Scans of the paper's samples on the simulated rigs recover the samples' parameters.
 
-Published parameters: Oren and Nayar 1995, Figs 16-18 and 20-22; their k_s/k_d leaves out the 1/4
-of our Torrance-Sparrow term, so ks here is four times theirs.
+Published parameters: Oren and Nayar 1995, Figs 16-18 and 20-22. Their k_s/k_d omits the factor 1/4
+of the Torrance-Sparrow term here, so ks is four times their value.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def assert_as_published(name: str, fitted: Fitted) -> None:
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_the_bench_gives_back_the_published_parameters(name: str, tmp_path: Path) -> None:
+def test_the_simulated_rig_recovers_the_published_parameters(name: str, tmp_path: Path) -> None:
     loaded = load(name)
     _, fitted, _ = measured(loaded, tmp_path / "run")
     assert_as_published(name, fitted)
@@ -76,10 +76,10 @@ def _with_seed(loaded: Loaded, seed: int) -> Loaded:
 
 
 @pytest.mark.slow
-def test_other_seeds_give_the_same_answer_and_honest_uncertainties(
+def test_other_seeds_give_the_same_parameters_within_their_uncertainties(
     slow: bool, tmp_path: Path
 ) -> None:
-    """Other noise, drift of the angles, tile and mottling; without --slow the foam of one seed."""
+    """Other noise, angle errors, tile and mottling; without --slow the foam with one seed."""
     pulls = []
     for seed in range(20 if slow else 1):
         for name in ("plaster_a", "foam_d") if slow else ("foam_d",):
@@ -91,11 +91,11 @@ def test_other_seeds_give_the_same_answer_and_honest_uncertainties(
             u_deg = chosen.u["sigma_deg"]
             assert u_deg is not None
             pulls.append((chosen.values["sigma_deg"] - PUBLISHED[name][0]) / u_deg)
-    # Forty pulls beyond 4 u would be one in four hundred runs, were the u right.
+    # With correct u, one in four hundred runs has any of forty pulls beyond 4.
     assert max(map(abs, pulls)) < 4.0, pulls
 
 
-def test_the_papers_rig_says_what_its_8_bits_cost(tmp_path: Path) -> None:
+def test_the_papers_rig_reports_the_cost_of_8_bits(tmp_path: Path) -> None:
     loaded = load("foam_d", "paper_1995")
     _, fitted, remarks = measured(loaded, tmp_path / "run")
     assert_as_published("foam_d", fitted)
@@ -104,7 +104,7 @@ def test_the_papers_rig_says_what_its_8_bits_cost(tmp_path: Path) -> None:
     assert float(without) <= float(now)
 
 
-def test_more_bits_leave_less_to_rounding(tmp_path: Path) -> None:
+def test_more_bits_reduce_the_rounding_uncertainty(tmp_path: Path) -> None:
     loaded = load("foam_d", "paper_1995")
     short = replace(
         loaded,

@@ -1,8 +1,8 @@
-"""A long scan: no point costs more than the first, in time or memory, and what follows is linear.
+"""A long scan: time and memory per point stay constant, and later processing is linear.
 
-With `--slow` 20 000 points, as a scan over a hemisphere has; else enough to see a slope. How fast
-the machine is changes while it runs, so every point's CPU time is divided by that of a picture
-which a bench of the test's own takes beside the scan.
+With `--slow` 20 000 points, as in a scan over the hemisphere; otherwise enough to show a trend. The
+speed of the machine varies, so the CPU time of each point is divided by that of a reference image
+rendered beside the scan.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from sim.scene.scene import Scene
 from tests.support.cpu_time import cpu_seconds
 from tests.support.scans import changed, small_scan
 
-MOST_MB = 20.0  # the product's promise: memory flat to this
-RAM = Path("/dev/shm")  # the scan's own time is asked for, not the disk's
-RULER_EVERY = 5  # steps
+MOST_MB = 20.0  # promised limit of memory growth
+RAM = Path("/dev/shm")  # measures the scan's time, not the disk's
+REFERENCE_EVERY = 5  # steps
 
 
 def soak_scan(azimuths: int) -> Loaded:
-    """A hemisphere in slices of 1000 points, each at all incidences; a surface quick to render."""
+    """Part of a hemisphere: 1000 points per azimuth, and a surface that renders fast."""
     small = small_scan(shrink=20)
     sweep = {
         "dphi_deg": [10.0 + 8.0 * n for n in range(azimuths)],
@@ -61,7 +61,7 @@ def soak_scan(azimuths: int) -> Loaded:
 
 
 def rss_mb() -> float:
-    """What this process has in memory now."""
+    """Present memory use of this process."""
     lines = Path("/proc/self/status").read_text().splitlines()
     (kilobytes,) = (line.split()[1] for line in lines if line.startswith("VmRSS:"))
     return int(kilobytes) / 1e3
@@ -69,11 +69,11 @@ def rss_mb() -> float:
 
 @dataclass
 class Watch:
-    """CPU time and memory at every point on disk, and what the ruler took (not counted)."""
+    """CPU time and memory at every accepted point, and the reference's CPU time (not included)."""
 
-    ruler: Callable[[], None]
+    take_reference: Callable[[], None]
     point_s: list[float] = field(default_factory=list)
-    ruler_s: list[float] = field(default_factory=list)
+    reference_s: list[float] = field(default_factory=list)
     memory_mb: list[float] = field(default_factory=list)
     _left_s: float = float("nan")
 
@@ -82,35 +82,35 @@ class Watch:
         if step.kind == "point":
             self.point_s.append(took_s)
             self.memory_mb.append(rss_mb())
-            if len(self.point_s) % RULER_EVERY == 0:
+            if len(self.point_s) % REFERENCE_EVERY == 0:
                 begun_s = time.process_time()
-                self.ruler()
-                self.ruler_s.append(time.process_time() - begun_s)
+                self.take_reference()
+                self.reference_s.append(time.process_time() - begun_s)
         self._left_s = time.process_time()
 
     def cost(self, points: slice) -> float:
-        """Of the median point, in pictures that the ruler took meanwhile."""
-        rulers = slice(points.start // RULER_EVERY, points.stop // RULER_EVERY)
-        return median(self.point_s[points]) / median(self.ruler_s[rulers])
+        """CPU time of the median point, in reference images rendered meanwhile."""
+        references = slice(points.start // REFERENCE_EVERY, points.stop // REFERENCE_EVERY)
+        return median(self.point_s[points]) / median(self.reference_s[references])
 
 
-def ruler(loaded: Loaded) -> Callable[[], None]:
-    """Takes a picture from a new angle, on a bench of its own."""
+def reference_image(loaded: Loaded) -> Callable[[], None]:
+    """Return a function that renders a scene of its own from a new angle."""
     scene = Scene.of(loaded.rig, loaded.protocol)
     camera, angles = SimulatedCamera(scene, SimulatedClock()), iter(range(10**9))
     for axis in ("theta_i", "dphi"):
         scene.set_axis(axis, 40.0)
 
-    def picture() -> None:
+    def take() -> None:
         scene.set_axis("theta_r", 0.01 * (next(angles) % 6000))
         camera.grab(1)
 
-    return picture
+    return take
 
 
 @dataclass(frozen=True)
 class Soaked:
-    """A scan that is through, its record still open."""
+    """A finished scan with its record still open."""
 
     loaded: Loaded
     plan: Plan
@@ -120,9 +120,9 @@ class Soaked:
 
 @contextmanager
 def soaked(azimuths: int) -> Iterator[Soaked]:
-    """As `gonio run` scans, with its progress and what drivers say."""
+    """Scan as `gonio run` does, with progress display and log."""
     loaded = soak_scan(azimuths)
-    plan, watch = make_plan(loaded), Watch(ruler(loaded))
+    plan, watch = make_plan(loaded), Watch(reference_image(loaded))
     show = acquisition.commands.scan_session.progress
 
     @contextmanager
@@ -146,11 +146,11 @@ def soaked(azimuths: int) -> Iterator[Soaked]:
 
 
 @pytest.mark.slow
-def test_a_long_scan_costs_no_more_at_its_end_than_at_its_beginning(slow: bool) -> None:
-    """The product's promise: memory within 20 MB, CPU time within 10 %, over 20 000 points.
+def test_points_at_the_end_of_a_long_scan_cost_no_more_than_at_the_beginning(slow: bool) -> None:
+    """Promise: memory within 20 MB and CPU time within 10 % over 20 000 points.
 
-    The bounded form compares 400 points with 400, more loosely: too few to average over what else
-    the machine does. Its first arc, for which windows are worked out, is left out.
+    Without --slow it compares 400 points with 400, within 25 %: too few to average over other load.
+    The first arc, for which the windows are computed, is then left out.
     """
     azimuths, warm, part, allowed = (20, 0, 1000, 0.10) if slow else (1, 100, 400, 0.25)
     with soaked(azimuths) as done:
@@ -163,40 +163,42 @@ def test_a_long_scan_costs_no_more_at_its_end_than_at_its_beginning(slow: bool) 
         ratio = watch.cost(last) / watch.cost(first)
         sys.stdout.write(
             f"\n{points} points: {1e3 * median(watch.point_s[first]):.2f} ms CPU a point in the "
-            f"first {part}, {1e3 * median(watch.point_s[last]):.2f} ms in the last; beside the "
-            f"ruler {ratio:.3f}; memory {median(watch.memory_mb[first]):.1f} MB, then "
+            f"first {part}, {1e3 * median(watch.point_s[last]):.2f} ms in the last; relative to "
+            f"the reference {ratio:.3f}; memory {median(watch.memory_mb[first]):.1f} MB, then "
             f"{grown_mb:+.1f} MB\n"
         )
         assert abs(grown_mb) < MOST_MB
         assert ratio == pytest.approx(1.0, abs=allowed)
-        _what_follows_is_linear(done)
+        _later_processing_is_linear(done)
 
 
-def _what_follows_is_linear(done: Soaked) -> None:
-    """Reading the record, reducing it and finding what is missing: per point as for a quarter.
+def _later_processing_is_linear(done: Soaked) -> None:
+    """Reduction and the search for missing steps take no longer per point than for a quarter.
 
-    A quadratic way would take four times as long a point; fixed costs only make it less.
+    A quadratic algorithm would take four times as long; fixed costs only reduce the ratio.
     """
     loaded, checks = done.loaded, done.record.checks()
     whole = done.record.readings()
     part = whole[: len(whole) // 4]
-    ways: dict[str, Callable[[list[object]], object]] = {
+    algorithms: dict[str, Callable[[list[object]], object]] = {
         "reduce": lambda readings: reduce(readings, loaded.protocol, checks),
         "missing": lambda readings: Progress(tuple(readings)).missing(done.plan),
     }
-    for name, way in ways.items():
-        a_point = [cpu_seconds(lambda r=r, w=way: w(r), 3) / len(r) for r in (part, whole)]
-        assert a_point[1] < 2.5 * a_point[0], (name, a_point)
+    for name, algorithm in algorithms.items():
+        per_point_s = [
+            cpu_seconds(lambda r=r, a=algorithm: a(r), 3) / len(r) for r in (part, whole)
+        ]
+        assert per_point_s[1] < 2.5 * per_point_s[0], (name, per_point_s)
 
 
 @pytest.mark.slow
 def test_planning_is_linear(slow: bool) -> None:
     few, many = (2, 20) if slow else (1, 3)
-    a_step = []
+    per_step_s = []
     for azimuths in (few, many):
         loaded = soak_scan(azimuths)
         begun_s = time.process_time()
         plan = make_plan(loaded)
-        a_step.append((time.process_time() - begun_s) / len(plan.steps))
+        per_step_s.append((time.process_time() - begun_s) / len(plan.steps))
         assert len(plan.points) == 1000 * azimuths
-    assert a_step[1] < 2.5 * a_step[0], a_step
+    assert per_step_s[1] < 2.5 * per_step_s[0], per_step_s

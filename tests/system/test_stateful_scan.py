@@ -1,6 +1,6 @@
-"""Stopped, failed, refused, killed and gone on with, in any order: the record is of one scan.
+"""Scans stopped, failed, refused, killed and resumed in any order: the record is of one scan.
 
-The program has no pause of its own: to pause is Ctrl-C, to go on `gonio resume`.
+A pause is a Ctrl-C followed by `gonio resume`.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ from instrument.record.reading import Reading
 from instrument.record.record import FILE_NAME, Record
 from tests.support.scans import changed, small_scan, undated
 
-RAM = Path("/dev/shm")  # thousands of commits: not on a disk, where there is memory to write to
-LONGER = 400  # calls of devices than any of these scans makes
+RAM = Path("/dev/shm")  # memory, where available: thousands of commits would wear a disk
+BEYOND_END = 400  # more device calls than any of these scans makes
 
 
 class Killed(BaseException):
-    """The process is no more: nothing that it would have done is done."""
+    """The process was killed: no clean-up takes place."""
 
 
 @cache
 def tiny_scan() -> Loaded:
-    """Twelve steps: two incidences of three views, tile, drift checks; six pixels to a side."""
+    """Twelve steps: two incidences with three views, white tile, drift checks; a tiny camera."""
     small = small_scan(shrink=20)
     return changed(
         small,
@@ -74,7 +74,7 @@ def tiny_plan() -> Plan:
 
 @cache
 def undisturbed() -> tuple[Reading, ...]:
-    """The readings of the scan that nothing interrupts."""
+    """Readings of the scan without interruption."""
     loaded = tiny_scan()
     with TemporaryDirectory() as folder, Record.create(Path(folder) / "run", {}) as record:
         Engine(loaded.protocol, loaded.rig, open_devices(loaded), record, [].append).run(
@@ -85,19 +85,19 @@ def undisturbed() -> tuple[Reading, ...]:
 
 @dataclass
 class Tripwire:
-    """Every call of a device passes here; the one numbered `at` ends as `error` says.
+    """Passes every device call; raises `error` at the first suitable call after number `at`.
 
-    `impatient`: a Ctrl-C more, at the first stop after that.
+    `impatient`: raise one more Ctrl-C at the first stop after that.
     """
 
-    at: int = LONGER
+    at: int = BEYOND_END
     error: BaseException | None = None
     impatient: bool = False
     calls: list[str] = field(default_factory=list)
     dead: bool = False
 
     def around(self, name: str, device: object) -> Any:
-        """The device, with the wire before each of its calls."""
+        """The device with the tripwire before each of its calls."""
         return _Wired(self, name, device)
 
     def passing(self, name: str) -> None:
@@ -113,7 +113,7 @@ class Tripwire:
             raise KeyboardInterrupt
 
     def _fits(self, name: str, error: BaseException) -> bool:
-        """Only who is asked can refuse; what makes safe may fail, but that ends no scan."""
+        """Only the operator refuses; a device error during the safe stop does not end a scan."""
         if isinstance(error, OperatorStop):
             return name == "operator.ask"
         made_safe = name.endswith(".stop") or name == "lamp.darken"
@@ -125,13 +125,13 @@ class _Wired:
         self._wire, self._name, self._device = wire, name, device
 
     def __getattr__(self, name: str) -> Any:
-        found = getattr(self._device, name)
-        if not callable(found):
-            return found
+        attribute = getattr(self._device, name)
+        if not callable(attribute):
+            return attribute
 
         def call(*arguments: object) -> object:
             self._wire.passing(f"{self._name}.{name}")
-            return found(*arguments)
+            return attribute(*arguments)
 
         return call
 
@@ -157,9 +157,9 @@ EVENT = {"stopped": "stopped", "refused": "stopped", "fault": "fault"}
 
 
 class ScanMachine(RuleBasedStateMachine):
-    """One run's folder, and what is done to it; each scan drives a bench that knows no reference.
+    """One run folder and the scans into it; each scan starts with axes not homed.
 
-    `ends`: the events that the scans so far must have left.
+    `ends`: events that the scans so far must have recorded.
     """
 
     @initialize()
@@ -172,7 +172,7 @@ class ScanMachine(RuleBasedStateMachine):
         self.wire, self.engine = Tripwire(), None
 
     def teardown(self) -> None:
-        """Whatever happened: going on to the end gives the whole scan."""
+        """Resuming to the end gives the complete scan, whatever happened before."""
         if not hasattr(self, "record"):
             return
         if not self.complete:
@@ -185,8 +185,8 @@ class ScanMachine(RuleBasedStateMachine):
     def complete(self) -> bool:
         return len(self.record.readings()) == len(tiny_plan().steps)
 
-    def run(self, end: str | None, at: int = LONGER, impatient: bool = False) -> None:
-        """Scan, or go on, as the commands do, until a call of a device ends it."""
+    def run(self, end: str | None, at: int = BEYOND_END, impatient: bool = False) -> None:
+        """Scan or resume, as the commands do, until a device call ends it."""
         loaded, before = tiny_scan(), Progress.of(self.record) if self.begun else None
         self.begun = True
         self.wire = Tripwire(at, ENDS[end]() if end else None, impatient and end is not None)
@@ -221,7 +221,7 @@ class ScanMachine(RuleBasedStateMachine):
             self.ends.append(EVENT.get(end, "finished"))
 
     def _left_safe(self) -> None:
-        """Every axis was told to stop after the last motion began, and the lamp is dark."""
+        """Every axis was stopped after the last motion began, and the lamp is dark."""
         if self.wire.dead:
             return
         calls = self.wire.calls
@@ -238,8 +238,8 @@ class ScanMachine(RuleBasedStateMachine):
 
     @precondition(lambda self: self.engine is not None)
     @rule()
-    def latched(self) -> None:
-        """The engine that has ended drives nothing again."""
+    def engine_is_latched(self) -> None:
+        """An engine whose scan has ended moves nothing again."""
         calls = list(self.wire.calls)
         with pytest.raises(DeviceError, match="nothing moves again before the operator"):
             self.engine.run(tiny_plan(), Progress.of(self.record))
@@ -247,7 +247,7 @@ class ScanMachine(RuleBasedStateMachine):
 
     @rule()
     def claimed_twice(self) -> None:
-        """A second scan into the same run is refused, and named who scans; then it may."""
+        """A second scan into a claimed run is refused, naming the first process; afterwards not."""
         with Record.open(self.folder) as other:
             with (
                 self.record.claimed(),
@@ -264,13 +264,13 @@ class ScanMachine(RuleBasedStateMachine):
         self.record = Record.open(self.folder)
 
     @invariant()
-    def the_readings_are_the_first_of_the_plan_and_the_undisturbed_ones(self) -> None:
+    def readings_are_the_first_of_the_undisturbed_scan(self) -> None:
         if hasattr(self, "record"):
             readings = undated(self.record.readings())
             assert readings == list(undisturbed()[: len(readings)])
 
     @invariant()
-    def what_belongs_to_readings_belongs_to_accepted_ones(self) -> None:
+    def frames_previews_and_darks_belong_to_accepted_readings(self) -> None:
         if not hasattr(self, "record"):
             return
         readings = self.record.readings()
@@ -284,14 +284,14 @@ class ScanMachine(RuleBasedStateMachine):
         assert not any(check.jumped for check in self.record.checks())
 
     @invariant()
-    def every_end_is_told(self) -> None:
+    def every_end_is_recorded(self) -> None:
         if hasattr(self, "record"):
             told = ("stopped", "fault", "finished")
             assert [kind for _, kind, _ in self.record.events() if kind in told] == self.ends
 
 
 @pytest.mark.slow
-def test_however_often_a_scan_is_ended_and_gone_on_with_it_is_the_same_scan(slow: bool) -> None:
+def test_a_scan_ended_and_resumed_any_number_of_times_is_the_same_scan(slow: bool) -> None:
     machine: Any = ScanMachine
     examples, steps = (400, 15) if slow else (12, 6)
     run_state_machine_as_test(
