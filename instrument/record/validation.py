@@ -45,9 +45,21 @@ def check_files(folder: Path, record: str, *others: str) -> None:
         path = folder / name
         if path.is_symlink() or (path.exists() and not stat.S_ISREG(path.stat().st_mode)):
             raise InputError(f"{path}: is a link or no file; allowed: a regular file: {_ADVICE}")
+    path = folder / record
+    if _header(path)[18:] > b"\2":  # write version of the file format
+        raise InputError(f"{path}: not a record of this program: its header forbids writing")
     journal = folder / f"{record}-journal"
     if journal.is_symlink() or journal.exists():
         raise InputError(f"{journal}: {_NOT_BEGUN}; else it is no run of this program: {_ADVICE}")
+
+
+def _header(path: Path) -> bytes:
+    """Return the first 19 bytes of a file; nothing if it cannot be read, which SQLite will say."""
+    try:
+        with path.open("rb") as file:
+            return file.read(19)
+    except OSError:
+        return b""
 
 
 def check_schema(database: sqlite3.Connection, path: Path) -> int:

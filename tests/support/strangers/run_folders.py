@@ -115,6 +115,12 @@ def _damaged(sent: Sent) -> None:
     sent.record.write_bytes(data)
 
 
+def _read_only(sent: Sent) -> None:
+    data = bytearray(sent.record.read_bytes())
+    data[18] = 3  # write version of the file format
+    sent.record.write_bytes(data)
+
+
 def _fifo(sent: Sent) -> None:
     sent.record.unlink()
     os.mkfifo(sent.record)
@@ -198,6 +204,7 @@ REFUSED: dict[str, tuple[Callable[[Sent], None], str]] = {
         "png is 'x'; allowed: bytes",
     ),
     "damaged pages": (_damaged, "record.sqlite: "),
+    "a header that makes it read-only": (_read_only, "its header forbids writing"),
     "half the file": (
         lambda sent: sent.record.write_bytes(sent.record.read_bytes()[:10_000]),
         "record.sqlite: ",
