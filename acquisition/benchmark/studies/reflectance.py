@@ -19,7 +19,7 @@ from acquisition.benchmark.peers import lambertian_peers
 from acquisition.benchmark.studies import reflectance_truth as truth
 from acquisition.benchmark.studies.method import Method
 from acquisition.benchmark.study import Study
-from acquisition.benchmark.timing import Timed, timed
+from acquisition.benchmark.timing import timed
 from acquisition.benchmark.trial import Trial, select
 from analysis.models import MODELS
 from analysis.models.rough.form_error_table import tabulated_brdf
@@ -134,8 +134,8 @@ def rough_study(effort: Effort) -> Study:
     true = truth.rough_surface(probe, ALBEDO, SIGMAS_DEG)
     for method in (*ROUGH, *peers):  # sigmas inside: the exact method keeps its sums of the angles
         for n, sigma_deg in enumerate(SIGMAS_DEG):
-            time = run(method, batch, effort.repeats, ALBEDO, sigma_deg)
-            trials.append(_trial(name, f"σ = {sigma_deg:g}°", method, time, true[n]))
+            scene, parameters = f"σ = {sigma_deg:g}°", (ALBEDO, sigma_deg)
+            trials.append(_trial(name, scene, method, batch, effort.repeats, true[n], *parameters))
     clear_profile_cache()
     trials.sort(key=lambda t: float(t.scene.strip("σ =°")))
     return _study(
@@ -171,10 +171,8 @@ def wolff_study(effort: Effort) -> Study:
     probe, batch = _everywhere(effort)
     name, trials = "wolff", list[Trial]()
     for rho in RHOS:
-        true = truth.wolff(probe, rho, INDEX)
-        for method in WOLFF:
-            time = run(method, batch, effort.repeats, rho, INDEX)
-            trials.append(_trial(name, f"ϱ = {rho:g}", method, time, true))
+        scene, true = f"ϱ = {rho:g}", truth.wolff(probe, rho, INDEX)
+        trials += [_trial(name, scene, m, batch, effort.repeats, true, rho, INDEX) for m in WOLFF]
     return _study(
         name,
         trials,
@@ -206,9 +204,9 @@ def beckmann_study(effort: Effort) -> Study:
         true = truth.beckmann(probe, *lengths)
         g = float(np.median(optical_roughness(probe, lengths[0])))
         scene = f"σₕ = {lengths[0]:g} λ (g ≈ {float(f'{g:.1g}'):g})"
-        for method in BECKMANN:
-            time = run(method, batch, effort.repeats, 1.0, *lengths)
-            trials.append(_trial(name, scene, method, time, true))
+        trials += [
+            _trial(name, scene, m, batch, effort.repeats, true, 1.0, *lengths) for m in BECKMANN
+        ]
     worst = short(max(t.error for t in select(trials, default=True)))
     return _study(
         name,
@@ -222,26 +220,23 @@ def beckmann_study(effort: Effort) -> Study:
     )
 
 
-def run(
-    method: Method[ParametricBrdf], batch: Geometry, repeats: int, *parameters: float
-) -> Timed[FloatArray]:
-    """Time a method on a batch, (N,) geometries in degrees, or on its first ones if it is slow.
-
-    Each call gets a new `Geometry`, for which nothing is cached yet. The value is (n,), in 1/sr.
-    """
-    size = _FEW if method.before is not None else batch.theta_i_deg.size
-    arrays = tuple(a[:size] for a in (batch.theta_i_deg, batch.theta_r_deg, batch.dphi_deg))
-    return timed(lambda: method.call(Geometry(*arrays), *parameters), repeats, method.before)
-
-
 def _trial(
     study: str,
     scene: str,
     method: Method[ParametricBrdf],
-    time: Timed[FloatArray],
+    batch: Geometry,
+    repeats: int,
     true: FloatArray,
+    *parameters: float,
 ) -> Trial:
-    """Return a trial; its errors are those of the timed values, at the head of the batch."""
+    """Time a method on a batch, or on its first geometries if it is slow.
+
+    Each call gets a new `Geometry`, for which nothing is cached yet. The errors are those of the
+    timed values, at the head of the batch.
+    """
+    size = _FEW if method.before is not None else batch.theta_i_deg.size
+    arrays = tuple(a[:size] for a in (batch.theta_i_deg, batch.theta_r_deg, batch.dphi_deg))
+    time = timed(lambda: method.call(Geometry(*arrays), *parameters), repeats, method.before)
     errors = (time.value[: true.size] - true) / np.maximum(true, LEAST * true.max())
     return method.timed_trial(study, scene, time, 1e9, errors)
 
@@ -271,8 +266,6 @@ def _probes(
     theta_i: FloatArray, theta_r: FloatArray, dphi: FloatArray, count: int
 ) -> tuple[Geometry, Geometry]:
     """Return the first `count` geometries, and all of them."""
-    first, batch = (
-        Geometry.from_degrees(theta_i=theta_i[:n], theta_r=theta_r[:n], dphi=dphi[:n])
-        for n in (count, theta_i.size)
-    )
-    return first, batch
+    batch = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
+    first = (a[:count] for a in (batch.theta_i_deg, batch.theta_r_deg, batch.dphi_deg))
+    return Geometry(*first), batch
