@@ -16,13 +16,7 @@ import numpy as np
 
 from analysis.accuracy.render_brdf import adequate_brdf
 from analysis.models import MODELS
-from instrument.config.protocol import (
-    PatchConfig,
-    Protocol,
-    Sample,
-    SimulatedSample,
-    WhiteTile,
-)
+from instrument.config.protocol import PatchConfig, Protocol, Sample, SimulatedSample, WhiteTile
 from instrument.config.rig import Rig
 from instrument.devices import Surface
 from instrument.geometry import Brdf, FloatArray, IntArray
@@ -60,13 +54,8 @@ class Scene:
         """Return the scene of a protocol; raise `ValueError` if it has no `simulated_sample`."""
         if protocol.simulated_sample is None:
             raise ValueError("the protocol has no simulated_sample: describe the sample")
-        return cls(
-            rig,
-            protocol.simulated_sample,
-            protocol.sample,
-            protocol.window,
-            protocol.references.white_tile,
-        )
+        tile = protocol.references.white_tile
+        return cls(rig, protocol.simulated_sample, protocol.sample, protocol.window, tile)
 
     @classmethod
     def of_white_sample(cls, rig: Rig) -> Scene:

@@ -1,4 +1,4 @@
-"""Speed, as ratios within one run; what is timed is checked to be right."""
+"""Speed of the simulated camera relative to NumPy's generator; the frames are checked too."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def seconds(action: Callable[[], object], repeats: int = 15) -> float:
     return median(times)
 
 
-def test_a_simulated_frame_costs_less_than_twice_the_normal_numbers_for_it() -> None:
-    """Four frames a geometry, as in the protocols; 512 x 480 pixels.
+def test_a_simulated_frame_takes_less_than_twice_the_time_of_its_random_numbers() -> None:
+    """Four frames per geometry, as in the protocols; 512 x 480 pixels.
 
-    Measured on one core of 2 GHz: 3.2 ms a frame (300 a second), NumPy's normal numbers 3.9 ms.
+    Measured on one core of 2 GHz: 3.2 ms per frame, NumPy's random numbers 3.9 ms.
     """
     loaded = load_protocol(
         CONFIGS / "protocols" / "demo.yaml", CONFIGS / "rigs" / "paper_1995.yaml"
@@ -56,7 +56,7 @@ def test_a_simulated_frame_costs_less_than_twice_the_normal_numbers_for_it() -> 
     window = window_at(40.0, pinhole, 20.0, 20.0)
     scene.set_axis("theta_r", 40.0)
     counts = [window.mean(f.image[window.crop]) - 8.0 for f in camera.grab(2)]
-    # White at normal incidence gives 2.5e6 electrons a second, 243 of them a count; the sample's
-    # albedo is 0.8 and the lamp stands at 40 degrees, backscatter a little above Lambert.
+    # White at normal incidence gives 2.5e6 electrons per second, at 243 electrons per count. The
+    # albedo is 0.8, the lamp stands at 40 degrees; backscatter lies a little above Lambert.
     lambertian = 2.5e6 * 0.01 / (60000 / 247) * 0.8 * np.cos(np.radians(40.0))
     assert np.mean(counts) == pytest.approx(1.08 * lambertian, rel=0.06)

@@ -24,7 +24,7 @@ from tests.support.paths import ROOT
 
 
 def gonio(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """Run the command from the project's folder, with nobody at its terminal."""
+    """Run the command from the project's folder, without a terminal."""
     return subprocess.run(
         [sys.executable, "-m", "acquisition", *map(str, arguments)],
         cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
@@ -33,7 +33,7 @@ def gonio(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 
 def gonio_here(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """Run the command with nobody at its terminal; what its own child prints is caught as well."""
+    """Run the command without a terminal; the output of its child processes is captured too."""
     with contextlib.ExitStack() as stack:
         stack.enter_context(contextlib.chdir(cwd or Path.cwd()))
         nobody = stack.enter_context(Path(os.devnull).open())
@@ -53,7 +53,7 @@ def gonio_here(*arguments: object, cwd: Path | None = None) -> subprocess.Comple
 
 
 def _exit_code() -> int:
-    """What the process would end with; anything but a `SystemExit` is the test's failure."""
+    """Exit code of the command; any exception but `SystemExit` fails the test."""
     try:
         main()
     except SystemExit as end:
@@ -63,7 +63,7 @@ def _exit_code() -> int:
 
 @contextlib.contextmanager
 def _standing_for(number: int, file: IO[str] | IO[bytes]) -> Iterator[None]:
-    """The file in place of one of the process's three descriptors, which children inherit."""
+    """Replace a standard descriptor of the process, which children inherit, by the file."""
     kept = os.dup(number)
     os.dup2(file.fileno(), number)
     try:
@@ -74,13 +74,13 @@ def _standing_for(number: int, file: IO[str] | IO[bytes]) -> Iterator[None]:
 
 
 def _text(number: int) -> TextIOWrapper:
-    """A writer like the one that Python opens on the descriptor; lines go out at once."""
+    """Line-buffered text stream on the descriptor, like Python's own."""
     return open(number, "w", buffering=1, encoding="utf-8", closefd=False)
 
 
 @contextlib.contextmanager
 def _own_signals() -> Iterator[None]:
-    """The command takes SIGINT and SIGTERM; the test runner gets them back."""
+    """Restore the handlers of SIGINT and SIGTERM, which the command replaces."""
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 
 def cpu_seconds(action: Callable[[], object], repeats: int) -> float:
-    """Least CPU time of one call: what else runs on the machine only adds to it."""
+    """Least CPU time of one call: other load can only increase it."""
     times = []
     for _ in range(repeats):
         start = time.process_time()
@@ -18,7 +18,7 @@ def cpu_seconds(action: Callable[[], object], repeats: int) -> float:
 
 
 def cpu_ratio(one: Callable[[], object], other: Callable[[], object], repeats: int) -> float:
-    """Least CPU time of one call over that of another, the two called in turn."""
+    """Ratio of the least CPU times of two functions, called alternately."""
     least = [math.inf, math.inf]
     for _ in range(repeats):
         for n, action in enumerate((one, other)):

@@ -1,4 +1,4 @@
-"""Folders that tests read: the project's own, and the shipped configuration."""
+"""Folders of the project and of the shipped configuration."""
 
 from __future__ import annotations
 
