@@ -14,9 +14,10 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
 from instrument.errors import GonioError, OperatorStop, StorageError
 from instrument.text.terminal_safe import escape_control_characters
@@ -26,7 +27,18 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 STOPPING_S = 2.0  # time allowed for stopping all devices
 
+
+class _Commands(TyperGroup):
+    """Group whose commands end with an exit code of the program where they fail."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command."""
+        with errors_as_exit_codes():
+            return super().invoke(ctx)
+
+
 app = typer.Typer(
+    cls=_Commands,
     help="Measure how a flat sample reflects light, and find the simplest model that explains it.",
     no_args_is_help=True,
     add_completion=False,
@@ -49,40 +61,35 @@ Json = Annotated[
     bool, typer.Option("--json", help="Print only the result, as JSON, on standard output.")
 ]
 
+RigOnly = Annotated[Path | None, typer.Option("--rig", help="The rig file.")]
+Yes = Annotated[bool, typer.Option("--yes", help="The rig is clear and may move: do not ask.")]
+AxisName = Annotated[str, typer.Argument(help="theta_i, dphi or theta_r.")]
+
 
 @app.command()
 def run(
     protocol: ProtocolFile, rig: RigFile = None, out: OutFolder = None, json: Json = False
 ) -> None:
     """Run a scan from a protocol: measure, fit and report."""
-    with errors_as_exit_codes():
-        from acquisition.commands.scan import run_protocol
+    from acquisition.commands.scan import run_protocol
 
-        run_protocol(protocol, rig, out, as_json=json)
+    run_protocol(protocol, rig, out, as_json=json)
 
 
 @app.command()
 def plan(protocol: ProtocolFile, rig: RigFile = None, json: Json = False) -> None:
     """Show the geometries and the duration of a scan; opens no device."""
-    with errors_as_exit_codes():
-        from acquisition.commands.scan import show_plan
+    from acquisition.commands.scan import show_plan
 
-        show_plan(protocol, rig, as_json=json)
+    show_plan(protocol, rig, as_json=json)
 
 
 @app.command()
-def resume(
-    folder: RunFolder,
-    yes: Annotated[
-        bool, typer.Option("--yes", help="The rig is clear and may move: do not ask.")
-    ] = False,
-    json: Json = False,
-) -> None:
+def resume(folder: RunFolder, yes: Yes = False, json: Json = False) -> None:
     """Resume a stopped run at the first geometry that is missing in its record."""
-    with errors_as_exit_codes():
-        from acquisition.commands.scan import resume_run
+    from acquisition.commands.scan import resume_run
 
-        resume_run(folder, yes=yes, as_json=json)
+    resume_run(folder, yes=yes, as_json=json)
 
 
 @app.command()
@@ -118,28 +125,19 @@ def fit(
     Exits with 0 whether or not a model is adequate, with 5 if the data do not determine the
     parameters.
     """
-    with errors_as_exit_codes():
-        from acquisition.commands.fit import fit_source
-        from acquisition.results.sources import Wanted
+    from acquisition.commands.fit import fit_source
+    from acquisition.results.sources import Wanted
 
-        wanted = Wanted(
-            format=format, sample=sample, max_theta_deg=max_theta_deg, relative=relative
-        )
-        fit_source(source, wanted, models=models, robust=robust, method=method, as_json=json)
+    wanted = Wanted(format=format, sample=sample, max_theta_deg=max_theta_deg, relative=relative)
+    fit_source(source, wanted, models=models, robust=robust, method=method, as_json=json)
 
 
 @app.command()
 def report(folder: RunFolder, json: Json = False) -> None:
     """Fit a run again and rewrite its table and its report."""
-    with errors_as_exit_codes():
-        from acquisition.commands.scan import report_run
+    from acquisition.commands.scan import report_run
 
-        report_run(folder, as_json=json)
-
-
-RigOnly = Annotated[Path | None, typer.Option("--rig", help="The rig file.")]
-Yes = Annotated[bool, typer.Option("--yes", help="The rig is clear and may move: do not ask.")]
-AxisName = Annotated[str, typer.Argument(help="theta_i, dphi or theta_r.")]
+    report_run(folder, as_json=json)
 
 
 @app.command()
@@ -154,19 +152,17 @@ def devices(
     --identify sends the query of every known controller to every port: do not use it while other
     machines are connected.
     """
-    with errors_as_exit_codes():
-        from acquisition.commands.setup import list_devices
+    from acquisition.commands.setup import list_devices
 
-        list_devices(rig, identify=identify)
+    list_devices(rig, identify=identify)
 
 
 @app.command()
 def home(axis: AxisName, rig: RigOnly = None, yes: Yes = False) -> None:
     """Home an axis: it moves until it has found its reference."""
-    with errors_as_exit_codes():
-        from acquisition.commands.setup import home_axis
+    from acquisition.commands.setup import home_axis
 
-        home_axis(axis, rig, yes=yes)
+    home_axis(axis, rig, yes=yes)
 
 
 @app.command(context_settings={"ignore_unknown_options": True})
@@ -177,10 +173,9 @@ def move(
     yes: Yes = False,
 ) -> None:
     """Move one homed axis. Keep-out zones are not checked: the other axes are not read."""
-    with errors_as_exit_codes():
-        from acquisition.commands.setup import move_axis
+    from acquisition.commands.setup import move_axis
 
-        move_axis(axis, angle_deg, rig, yes=yes)
+    move_axis(axis, angle_deg, rig, yes=yes)
 
 
 @app.command()
@@ -204,17 +199,9 @@ def grab(
     json: Json = False,
 ) -> None:
     """Take one frame with the measuring window drawn on it, for aiming. Nothing moves."""
-    with errors_as_exit_codes():
-        from acquisition.commands.setup import grab_frame
+    from acquisition.commands.setup import grab_frame
 
-        grab_frame(
-            out,
-            rig_path=rig,
-            protocol_path=protocol,
-            theta_r_deg=theta_r_deg,
-            exposure_s=exposure_s,
-            as_json=json,
-        )
+    grab_frame(out, rig, protocol, theta_r_deg=theta_r_deg, exposure_s=exposure_s, as_json=json)
 
 
 @app.command()
@@ -228,10 +215,9 @@ def bench(
     ] = False,
 ) -> None:
     """Measure and chart speed against accuracy, for each method, on this machine."""
-    with errors_as_exit_codes():
-        from acquisition.benchmark.command import run_benchmark
+    from acquisition.benchmark.command import run_benchmark
 
-        run_benchmark(out, quick, maps)
+    run_benchmark(out, quick, maps)
 
 
 def main() -> None:

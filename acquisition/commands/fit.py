@@ -23,13 +23,7 @@ from instrument.errors import InputError, NotDetermined
 
 
 def fit_source(
-    path: Path,
-    wanted: Wanted,
-    *,
-    models: str | None,
-    robust: bool,
-    method: str,
-    as_json: bool,
+    path: Path, wanted: Wanted, *, models: str | None, robust: bool, method: str, as_json: bool
 ) -> None:
     """Fit the `wanted` part of a source and print the outcome.
 

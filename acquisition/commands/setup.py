@@ -76,9 +76,9 @@ def _print_position(axis: str, angle_deg: float) -> None:
 
 def grab_frame(
     path: Path,
-    *,
     rig_path: Path | None,
     protocol_path: Path | None,
+    *,
     theta_r_deg: float,
     exposure_s: float | None,
     as_json: bool,
