@@ -48,7 +48,7 @@ class GridSpline:
         return GridSpline(self.knots[1:], np.tensordot(basis[:, 0], rows, axes=1))
 
     def at(self, *x: FloatArray) -> FloatArray:
-        """Return the values (M, N) at points, an array (N,) an axis; NaN outside the grid."""
+        """Return the values (M, N), in their unit, at N points given by axis; NaN outside."""
         shape = self.coefficients.shape[:-1]
         columns = np.ascontiguousarray(self.coefficients.reshape(-1, self.coefficients.shape[-1]).T)
         corners = np.indices((4,) * len(x)).reshape(len(x), -1, 1)
