@@ -1,10 +1,12 @@
-"""The house itself: whose modules are imported, and how quickly the command answers."""
+"""Structure of the project: its rooms and their size, imports, and what is packaged."""
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from importlib.resources import files
 from pathlib import Path
 
@@ -66,3 +68,45 @@ def test_every_folder_with_modules_is_a_listed_package() -> None:
         listed = set(tomllib.load(file)["tool"]["setuptools"]["packages"])
     rooms = {p.parent for top in (*PACKAGES, "configs") for p in (ROOT / top).rglob("*.py")}
     assert {".".join(room.relative_to(ROOT).parts) for room in rooms} == listed
+
+
+def _tracked() -> list[Path]:
+    """Files of the project that are neither made by a build nor hidden."""
+    tops = [*PACKAGES, "configs", "tests", "docs"]
+    found = [p for top in tops if (ROOT / top).is_dir() for p in (ROOT / top).rglob("*")]
+    return [p for p in found if p.is_file() and "__pycache__" not in p.parts]
+
+
+def test_no_room_has_more_than_twelve_files() -> None:
+    rooms = Counter(path.parent.relative_to(ROOT) for path in _tracked())
+    assert not {str(room): count for room, count in rooms.items() if count > 12}
+
+
+def test_no_module_has_more_than_400_lines() -> None:
+    long = {str(p.relative_to(ROOT)): len(p.read_text().splitlines()) for p in _tracked()
+            if p.suffix == ".py"}  # fmt: skip
+    assert not {name: lines for name, lines in long.items() if lines > 400}
+
+
+def test_the_folders_at_the_top_are_the_seven_and_docs() -> None:
+    done = subprocess.run(
+        ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if done.returncode != 0:
+        pytest.skip("no git checkout: which files belong to the project is not known")
+    tops = {Path(name).parts[0] for name in done.stdout.splitlines() if "/" in name}
+    assert tops - {".ci"} <= {*PACKAGES, "configs", "tests", "docs"}
+
+
+def test_a_room_without_a_place_fails_the_import_contracts(tmp_path: Path) -> None:
+    """The contracts are exhaustive: a new module that none of them names is an error."""
+    for top in PACKAGES:
+        shutil.copytree(ROOT / top, tmp_path / top, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    (tmp_path / "acquisition" / "new_room.py").write_text("")
+    linter = Path(sys.executable).with_name("lint-imports")
+    done = subprocess.run(
+        [linter, "--no-cache"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "acquisition.new_room" in done.stdout

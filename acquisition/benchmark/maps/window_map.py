@@ -9,7 +9,7 @@ import numpy as np
 from acquisition.benchmark.maps.map_style import columns_of, joined
 from acquisition.benchmark.output.axes_grid import axes_grid
 from acquisition.benchmark.result import MapPicture
-from acquisition.benchmark.studies.window_truth import (
+from acquisition.benchmark.window_truth import (
     LAMP_DEG,
     LAMP_MM,
     irradiance,

@@ -12,7 +12,10 @@ import numpy as np
 from acquisition.benchmark.effort import Effort
 from acquisition.benchmark.number_text import rounded, short
 from acquisition.benchmark.studies.method import Method
-from acquisition.benchmark.studies.window_truth import (
+from acquisition.benchmark.study import Study
+from acquisition.benchmark.timing import timed
+from acquisition.benchmark.trial import Trial, select
+from acquisition.benchmark.window_truth import (
     PATCH_MM,
     WAVE_DEPTH,
     outline,
@@ -21,9 +24,6 @@ from acquisition.benchmark.studies.window_truth import (
     radiance,
     shipped_camera,
 )
-from acquisition.benchmark.study import Study
-from acquisition.benchmark.timing import timed
-from acquisition.benchmark.trial import Trial, select
 from acquisition.measure.window import window_at
 from instrument.geometry import FloatArray
 from instrument.pinhole import Pinhole, area_per_pixel_mm2

@@ -12,7 +12,7 @@ from acquisition.benchmark.maps.window_map import (
     pixels_and_bias,
     window_picture,
 )
-from acquisition.benchmark.studies.window_truth import shipped_camera
+from acquisition.benchmark.window_truth import shipped_camera
 from acquisition.measure.window import window_at
 from instrument.config.load import load_protocol
 from instrument.pinhole import Pinhole

@@ -8,7 +8,7 @@ from acquisition.benchmark.studies.window_methods import (
     supersampled,
     window_studies,
 )
-from acquisition.benchmark.studies.window_truth import picture, shipped_camera
+from acquisition.benchmark.window_truth import picture, shipped_camera
 from tests.support.benchmark import FEW
 from tests.support.cpu_time import cpu_ratio
 
