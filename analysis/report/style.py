@@ -9,6 +9,7 @@ import io
 import math
 import re
 from collections.abc import Callable
+from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -29,6 +30,9 @@ _DASHES: tuple[Dashes, ...] = (
 INK, GREY, GRID, BAND = "#222222", "#666666", "#DDDDDD", "#ECECEC"
 
 _WIDTH_IN = 9.6
+
+_FLOAT_DIGITS = 15  # significant decimal digits that every float keeps
+_PLAIN = (-6, 6)  # powers of ten of the first digit that are written as plain decimals
 
 _SETTINGS: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -97,25 +101,43 @@ def _embedded(svg: str, name: str) -> str:
 def format_value(value: float, u: float | None, unit: str = "") -> str:
     """Format a value rounded to two significant digits of its uncertainty: `20.013 ± 0.021 °`.
 
-    Without a valid uncertainty: the value alone, with four significant digits.
+    Without a valid uncertainty: the value alone, with four significant digits. Where u lies beyond
+    the last digit that a float holds, each of the two has a power of ten of its own.
     """
     suffix = f"\u00a0{unit}" if unit else ""
     if not math.isfinite(value):
         return "—"
     if u is None or not math.isfinite(u) or u <= 0:
-        return f"{value:.4g}{suffix}"
-    first = int(f"{u:.1e}".partition("e")[2])
-    largest = int(f"{max(abs(value), u):e}".partition("e")[2])
-    if first < -6 or largest > 6:
-        scaled = format_value(value / 10.0**largest, u / 10.0**largest)
-        return f"({scaled})\u00a0×\u00a010{_superscript(largest)}{suffix}"
-    digits = 1 - first
-    decimals = max(digits, 0)
-    return f"{round(value, digits):.{decimals}f} ± {round(u, digits):.{decimals}f}{suffix}"
+        return f"{_general(value, 4)}{suffix}"
+    first = _exponent(u, 2)
+    largest = max(_exponent(max(abs(value), u), _FLOAT_DIGITS), first)
+    if largest - first >= _FLOAT_DIGITS:
+        return f"{_general(value, _FLOAT_DIGITS)} ± {_general(u, 2)}{suffix}"
+    plain = _PLAIN[0] <= largest <= _PLAIN[1] or (_PLAIN[0] <= first and largest <= _PLAIN[1])
+    power = 0 if plain else largest
+    text = " ± ".join(_rounded(number, first - 1, power) for number in (value, u))
+    return f"{text}{suffix}" if plain else f"({text}){_times_ten_to(power)}{suffix}"
 
 
-def _superscript(power: int) -> str:
-    return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+def _exponent(number: float, digits: int) -> int:
+    """Power of ten of the first of `digits` significant digits, 0 for 0."""
+    return int(f"{number:.{digits - 1}e}".partition("e")[2])
+
+
+def _general(number: float, digits: int) -> str:
+    """A number with at most `digits` significant digits: 0.015, 1.5 × 10⁻⁹."""
+    mantissa, _, power = f"{number:.{digits}g}".partition("e")
+    return mantissa + (_times_ten_to(int(power)) if power else "")
+
+
+def _rounded(number: float, last: int, power: int) -> str:
+    """A number rounded to the digit of 10^last, in units of 10^power, in decimal notation."""
+    digit = Decimal(number).quantize(Decimal(1).scaleb(last))
+    return f"{digit.scaleb(-power) + 0:f}"  # + 0: no minus before a zero
+
+
+def _times_ten_to(power: int) -> str:
+    return "\u00a0×\u00a010" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 CSS = """
