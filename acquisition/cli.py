@@ -97,7 +97,10 @@ def fit(
     source: Annotated[Path, typer.Argument(help="A run's folder, or a CSV table.")],
     models: Annotated[
         str | None,
-        typer.Option(help="Candidate models, separated by commas. Default: the whole ladder."),
+        typer.Option(
+            help="Candidate models, separated by commas. Default: those of a run's protocol, else "
+            "the whole ladder."
+        ),
     ] = None,
     max_theta_deg: Annotated[
         float, typer.Option(help="Leave out points with a larger theta_i or theta_r (degrees).")
@@ -113,6 +116,12 @@ def fit(
         bool,
         typer.Option("--relative", help="The values are relative: no reference fixes their scale."),
     ] = False,
+    u_shared: Annotated[
+        str | None,
+        typer.Option(
+            help="Relative u of an error that all values share (0.5% or 0.005), for csv and curet."
+        ),
+    ] = None,
     method: Annotated[
         str,
         typer.Option(help="Method for rough surfaces: auto, qualitative, functional or exact."),
@@ -125,10 +134,16 @@ def fit(
     Exits with 0 whether or not a model is adequate, with 5 if the data do not determine the
     parameters.
     """
-    from acquisition.commands.fit import fit_source
+    from acquisition.commands.fit import fit_source, parse_u_shared
     from acquisition.results.sources import Wanted
 
-    wanted = Wanted(format=format, sample=sample, max_theta_deg=max_theta_deg, relative=relative)
+    wanted = Wanted(
+        format=format,
+        sample=sample,
+        max_theta_deg=max_theta_deg,
+        relative=relative,
+        u_shared=parse_u_shared(u_shared),
+    )
     fit_source(source, wanted, models=models, robust=robust, method=method, as_json=json)
 
 

@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich import box
@@ -18,8 +19,10 @@ from acquisition.terminal.console import out
 from analysis.choice.choice import Choice, choose
 from analysis.choice.fit_json import no_fit_json, to_json
 from analysis.choice.ladder import METHODS, MethodOfFit
+from analysis.data.text_file import parse_number
 from analysis.fit.fit import FitResult
 from instrument.errors import InputError, NotDetermined
+from instrument.text.quoting import printable
 
 
 def fit_source(
@@ -27,21 +30,24 @@ def fit_source(
 ) -> None:
     """Fit the `wanted` part of a source and print the outcome.
 
-    `models`: names separated by commas, None for the ladder. `method`: for rough surfaces, one of
-    `analysis.choice.ladder.METHODS`. Raises `InputError` for a wrong source or option, and
+    `models`: names separated by commas; None for those of a run's protocol, else the ladder.
+    `method`: for rough surfaces, one of `analysis.choice.ladder.METHODS`; auto: that of a run's
+    protocol. Raises `InputError` for a wrong source or option, and
     `NotDetermined`, after printing, where the data do not determine the parameters of the chosen
     model or are too few for any fit.
     """
     names, way = _names(models), _method(method, models)
     try:
         source = read_source(path, wanted)
+        if names is None and way == "auto":
+            names, way = source.fit.models, source.fit.method
         choice = choose(source.measurements, source.acceptance, names, robust, way)
     except NotDetermined as error:
         if as_json:
             _print_json(no_fit_json(str(error)))
         raise
     if as_json:
-        _print_json(to_json(choice))
+        _print_json(_with_notes(to_json(choice), source))
     else:
         _print(source, choice)
     if choice.verdict == "not identifiable":
@@ -73,8 +79,29 @@ def _method(method: str, models: str | None) -> MethodOfFit:
     raise InputError(f"--method: {method}; allowed: {', '.join(METHODS)}")
 
 
+def parse_u_shared(text: str | None) -> float | None:
+    """Relative u of an error that all values share: `0.5%`, or 0.005 as a plain number."""
+    if text is None:
+        return None
+    allowed = "allowed: more than 0 and less than 50 %, as 0.5% or 0.005"
+    number, percent = text.strip().removesuffix("%"), text.strip().endswith("%")
+    try:
+        u = parse_number(number) / (100 if percent else 1)
+    except ValueError as error:
+        raise InputError(f"--u-shared: {error}; {allowed}") from None
+    if not 0 < u < 0.5:
+        raise InputError(f"--u-shared: {printable(text)}; {allowed}")
+    return u
+
+
 def _print_json(fit: dict[str, object]) -> None:
     sys.stdout.write(json.dumps(fit, allow_nan=False) + "\n")
+
+
+def _with_notes(fit: dict[str, Any], source: Source) -> dict[str, Any]:
+    """Content of fit.json with the remarks on the source, if there are any."""
+    notes = [*fit.get("notes", []), *(note._asdict() for note in source.notes)]
+    return fit | {"notes": notes} if notes else fit
 
 
 def _print(source: Source, choice: Choice) -> None:
@@ -88,7 +115,12 @@ def _print(source: Source, choice: Choice) -> None:
         parameters.add_row(parameter.name, value_text(parameter))
     out.print(parameters)
     out.print(_table(choice.candidates, chosen))
-    for note in (*source.notes, choice.reason, str(choice.symmetry), *_notes(source, chosen)):
+    for note in (
+        *(n.text for n in source.notes),
+        choice.reason,
+        str(choice.symmetry),
+        *_notes(source, chosen),
+    ):
         out.print(f"- {note}", highlight=False)
 
 

@@ -53,7 +53,7 @@ def finish(record: Record, loaded: Loaded) -> Outcome:
         record.folder / "report.html",
     )
     with _recovery_named(record.folder):
-        table = measurements_csv(reduced, u_brdf)
+        table = measurements_csv(reduced, u_brdf, loaded)
         write_whole(record.folder / "measurements.csv", table)
         write_whole(record.folder / "fit.json", json.dumps(outcome.fit, indent=2, allow_nan=False))
     content = report_data(

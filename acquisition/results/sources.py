@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,9 +12,10 @@ from acquisition.results.fitting import measurements
 from acquisition.results.reduction import reduced_run
 from acquisition.results.run_folder import load_run_inputs
 from analysis.data.acceptance import Acceptance
-from analysis.data.csv_table import read_csv
+from analysis.data.csv_table import read_table
 from analysis.data.curet import read_curet
-from analysis.data.measurements import Measurements
+from analysis.data.measurements import Measurements, SharedError
+from instrument.config.protocol import FitConfig
 from instrument.errors import InputError, NotDetermined
 from instrument.record.record import FILE_NAME, Record
 
@@ -21,13 +23,24 @@ _MIN_MEAN = 1e-15  # of relative values: less is no light at all
 FORMATS = ("auto", "run", "csv", "curet")
 
 
+class Note(NamedTuple):
+    """Remark on a source: a code for programs, and a sentence."""
+
+    code: str
+    text: str
+
+
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Measurements, the rig's acceptance if it is known, and notes on points left out."""
+    """Measurements, the rig's acceptance if it is known, and remarks: points left out, assumptions.
+
+    fit: the models and the method that a run's protocol names.
+    """
 
     measurements: Measurements
     acceptance: Acceptance | None
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
+    fit: FitConfig = field(default_factory=FitConfig)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,13 +48,15 @@ class Wanted:
     """Selection from a source.
 
     format: one of FORMATS. sample: number of the material, for a database. max_theta_deg: largest
-    theta_i and theta_r. relative: the values have no absolute scale.
+    theta_i and theta_r. relative: the values have no absolute scale. u_shared: relative u of an
+    error that all values share, None if there is none; a run states its own.
     """
 
     format: str = "auto"
     sample: int | None = None
     max_theta_deg: float = 90.0
     relative: bool = False
+    u_shared: float | None = None
 
 
 def read_source(path: Path, wanted: Wanted) -> Source:
@@ -53,10 +68,15 @@ def read_source(path: Path, wanted: Wanted) -> Source:
             f"--sample: {'missing' if kind == 'curet' else wanted.sample} for the format {kind}; "
             "it names a material of the curet format, and is allowed only there"
         )
+    if wanted.u_shared is not None and kind == "run":
+        raise InputError(
+            f"--u-shared: {wanted.u_shared:g} for a run, which states its own shared errors; "
+            "allowed for the formats csv and curet"
+        )
     if kind == "curet":
         source = _curet(path, wanted)
     else:
-        source = _run(path) if kind == "run" else Source(read_csv(path), None, ())
+        source = _run(path) if kind == "run" else _csv(path, wanted)
         source = _cut(source, wanted.max_theta_deg)
     if wanted.relative:
         source = replace(source, measurements=_as_relative(path, source.measurements))
@@ -91,24 +111,59 @@ def _run(path: Path) -> Source:
         reduced = reduced_run(record, loaded)
     if not np.any(reduced.valid):
         raise NotDetermined(f"{path}: no geometry has been measured yet that could be fitted")
-    flagged = int(np.sum(~reduced.valid))
-    note = (f"{flagged} of {reduced.valid.size} points are flagged and not fitted",)
+    notes = _flagged(int(np.sum(~reduced.valid)), reduced.valid.size)
     acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
     try:
         found = measurements(reduced, loaded)
     except ValueError as error:  # values outside their domain, such as a u of 0
         raise NotDetermined(f"{path}: {error}") from None
-    return Source(found, acceptance, note if flagged else ())
+    return Source(found, acceptance, notes, loaded.protocol.fit)
+
+
+def _csv(path: Path, wanted: Wanted) -> Source:
+    table = read_table(path)
+    m = table.measurements
+    notes = _flagged(table.flagged, table.flagged + m.size)
+    source = Source(m, table.acceptance, notes)
+    return _with_assumptions(source, wanted, states_shared=table.states_shared)
+
+
+def _flagged(flagged: int, points: int) -> tuple[Note, ...]:
+    text = f"{flagged} of {points} points are flagged and not fitted"
+    return (Note("flagged", text),) if flagged else ()
+
+
+def _with_assumptions(source: Source, wanted: Wanted, *, states_shared: bool) -> Source:
+    """Add the requested shared error, and what is assumed as the source does not state it."""
+    m, notes = source.measurements, list(source.notes)
+    if wanted.u_shared is not None:
+        error = SharedError.common_to_all("--u-shared", wanted.u_shared, m.size)
+        source = replace(source, measurements=replace(m, shared=(*m.shared, error)))
+        text = f"all values share an error of {100 * wanted.u_shared:g} % (--u-shared)"
+        notes.append(Note("u_shared", text))
+    elif not states_shared:
+        text = (
+            "assumed: no error is shared by several values, such as that of a white tile; if one "
+            "is, state its relative u, which the uncertainty of the parameters lacks: --u-shared"
+        )
+        notes.append(Note("assumed_no_shared_error", text))
+    if not any((m.u_theta_i_deg, m.u_theta_r_deg, m.u_dphi_deg)):
+        notes.append(Note("assumed_exact_angles", "assumed: the angles are exact"))
+    if source.acceptance is None:
+        text = "assumed: lamp, lens and measured patch are small: no value is a mean over angles"
+        notes.append(Note("assumed_small_acceptance", text))
+    return replace(source, notes=tuple(notes))
 
 
 def _curet(path: Path, wanted: Wanted) -> Source:
     found = read_curet(path, wanted.sample or 0, wanted.max_theta_deg)
     used, asked = found.measurements.size, found.directions - found.beyond
-    note = (
+    text = (
         f"sample {wanted.sample}: {used} of {asked} directions up to {wanted.max_theta_deg:g} "
         f"degrees; {found.negative} negative and {found.zero} zero values masked"
     )
-    return Source(found.measurements, None, (note,))
+    source = Source(found.measurements, None, (Note("directions", text),))
+    return _with_assumptions(source, wanted, states_shared=False)
 
 
 def _cut(source: Source, max_theta_deg: float) -> Source:
@@ -116,8 +171,9 @@ def _cut(source: Source, max_theta_deg: float) -> Source:
     inside = np.maximum(m.theta_i_deg, np.abs(m.theta_r_deg)) <= max_theta_deg
     if np.all(inside):
         return source
-    note = f"{int(np.sum(~inside))} of {m.size} points lie beyond {max_theta_deg:g} degrees"
-    return replace(source, measurements=m.subset(inside), notes=(*source.notes, note))
+    text = f"{int(np.sum(~inside))} of {m.size} points lie beyond {max_theta_deg:g} degrees"
+    notes = (*source.notes, Note("cut", text))
+    return replace(source, measurements=m.subset(inside), notes=notes)
 
 
 def _as_relative(path: Path, m: Measurements) -> Measurements:

@@ -9,8 +9,8 @@ Angles are those of `instrument/geometry.py`: theta_r_deg may be signed, and kee
 Blank lines and lines that begin with # are skipped. A quoted field may contain commas, but no line
 end. Negative values of brdf are data: noise about zero.
 
-The measurements.csv of a run is such a table. Its `flags` are ignored like any further column, so
-flagged rows are read too; to leave them out, read the run's folder instead.
+A table may state more about its uncertainty in the columns of `csv_columns`. The measurements.csv
+of a run does: fitted, it gives what the run's folder gives.
 """
 
 from __future__ import annotations
@@ -21,18 +21,43 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.data.csv_header import BRDF, COLUMNS, ROWS, U_BRDF, Column, Header, read_header
+from analysis.data import csv_columns as columns
+from analysis.data.acceptance import Acceptance
+from analysis.data.csv_columns import BRDF, COLUMNS, U_BRDF, Column
+from analysis.data.csv_header import ROWS, Header, read_header
 from analysis.data.csv_line import QuoteError, column_of, texts_of
-from analysis.data.measurements import Measurements
+from analysis.data.csv_optional import OptionalColumns
+from analysis.data.measurements import Measurements, setting_numbers
 from analysis.data.text_file import TextFile, input_error, read_text
+from instrument.geometry import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class CsvTable:
+    """Content of a table: the rows to fit, and the rig's acceptance where it is stated.
+
+    flagged: number of rows left out because of their flags. states_shared: the table has columns
+    about errors that rows share, or states the independent part of u.
+    """
+
+    measurements: Measurements
+    acceptance: Acceptance | None
+    flagged: int
+    states_shared: bool
 
 
 def read_csv(path: Path) -> Measurements:
-    """Read a table of N rows; `u_random` is None if u_brdf is absent, or empty in every row.
+    """Read the rows to fit of a table, as `read_table` does."""
+    return read_table(path).measurements
+
+
+def read_table(path: Path) -> CsvTable:
+    """Read a table; `u_random` is None if no u is stated, or u_brdf is empty in every row.
 
     A row with the same three angles as an earlier one is a mistake. The same direction given by
     other angles (theta_r = 0 at two dphi; -20, 0 and 20, 180) is another setting of the lamp, as
-    in a scan with several dphi, and is read.
+    in a scan with several dphi, and is read. Where brdf is empty in every row, radiance over
+    cos(theta_i) is read, relative to an unknown level of each lamp setting.
     Raises `InputError` with every mistake in the file; the first 20 are listed.
     """
     file = read_text(path, pipe=True)
@@ -43,14 +68,16 @@ def read_csv(path: Path) -> Measurements:
     table.finish()
     if file.mistakes:
         raise input_error(file)
-    return table.measurements()
+    return table.content()
 
 
 @dataclass(slots=True)
 class _Table:
     """The rows below a header.
 
-    rows: a value for each of COLUMNS, NaN where none could be read.
+    rows: a value for each of COLUMNS, NaN where none could be read. fields: line and texts of each
+        of these rows.
+    flagged: number of rows with a flag, which are not read any further.
     first_lines: line of the first row with each geometry.
     blank: lines in which a column is empty that may be empty in every row.
     """
@@ -58,6 +85,8 @@ class _Table:
     file: TextFile
     header: Header
     rows: list[list[float]] = field(default_factory=list)
+    fields: list[tuple[int, list[str]]] = field(default_factory=list)
+    flagged: int = 0
     first_lines: dict[tuple[float, ...], int] = field(default_factory=dict)
     blank: dict[str, list[int]] = field(default_factory=lambda: {"brdf": [], "u_brdf": []})
 
@@ -71,8 +100,13 @@ class _Table:
         if len(fields) != self.header.width:
             self._note_width(line, text, len(fields))
             return
+        flags = self.header.indices.get(columns.FLAGS)
+        if flags is not None and fields[flags].strip():
+            self.flagged += 1
+            return
         row = [self._value(line, column, fields) for column in COLUMNS]
         self.rows.append(row)
+        self.fields.append((line, fields))
         angles = (row[0], row[1], row[2])
         first = self.first_lines.setdefault(angles, line)
         if first != line and not math.isnan(sum(angles)):
@@ -109,14 +143,19 @@ class _Table:
     def finish(self) -> None:
         """Note mistakes of the table as a whole."""
         if not self.rows:
-            if not self.file.mistakes:
+            if not self.file.mistakes and not self.flagged:
                 what = f"header: no row follows; allowed: {ROWS}"
                 self.file.note(self.header.line, 1, what)
-        elif len(self.blank["brdf"]) == len(self.rows):
+        elif self._no_brdf and columns.RADIANCE.name not in self.header.indices:
             what = "is empty in every row: no reference was taken, so there is no BRDF to fit"
-            self._note(self.header.line, "brdf", f"{what}; allowed: a scan with a white tile")
+            allowed = "a scan with a white tile, or a column radiance"
+            self._note(self.header.line, "brdf", f"{what}; allowed: {allowed}")
         else:
             self._note_blank()
+
+    @property
+    def _no_brdf(self) -> bool:
+        return 0 < len(self.rows) == len(self.blank["brdf"])
 
     def _note_blank(self) -> None:
         for column in (BRDF, U_BRDF):
@@ -125,7 +164,64 @@ class _Table:
                 what = f"is empty here, but not in every row; allowed: {column.allowed}"
                 self._note(line, column.name, what)
 
-    def measurements(self) -> Measurements:
-        """All rows in the order of the file, which must be free of mistakes."""
-        theta_i, theta_r, dphi, brdf, u = np.array(self.rows).T
-        return Measurements.bare(theta_i, theta_r, dphi, brdf, None if np.isnan(u).any() else u)
+    def content(self) -> CsvTable:
+        """All rows in the order of the file; further mistakes are noted, and raised.
+
+        Raises `InputError`.
+        """
+        theta_i, theta_r, dphi, brdf, u = np.array(self.rows).reshape(-1, len(COLUMNS)).T
+        optional = OptionalColumns(self.file, self.header, self.fields)
+        brdf = self._relative(optional, theta_i) if self._no_brdf else brdf
+        own = self._u_independent(optional, brdf)
+        u_random = None if own is None and np.isnan(u).any() else u if own is None else own
+        setting = optional.whole_numbers(columns.LAMP_SETTING)
+        shared, acceptance = optional.shared(), optional.acceptance()
+        u_theta_i, u_theta_r, u_dphi = self._u_angles(optional, u_random)
+        if self.file.mistakes:
+            raise input_error(self.file)
+        found = Measurements(
+            theta_i_deg=theta_i,
+            theta_r_deg=theta_r,
+            dphi_deg=dphi,
+            brdf=brdf,
+            u_random=u_random,
+            lamp_setting=setting_numbers(theta_i, dphi) if setting is None else setting,
+            shared=shared,
+            u_theta_i_deg=u_theta_i,
+            u_theta_r_deg=u_theta_r,
+            u_dphi_deg=u_dphi,
+            relative=self._no_brdf,
+            free_levels=self._no_brdf,
+        )
+        return CsvTable(found, acceptance, self.flagged, bool(shared) or own is not None)
+
+    def _relative(self, optional: OptionalColumns, theta_i_deg: FloatArray) -> FloatArray:
+        """Radiance over cos(theta_i), (N,), proportional to the BRDF at one lamp setting."""
+        radiance = optional.numbers(columns.RADIANCE)
+        if radiance is None:
+            what = "is empty in every row, and so is radiance; allowed: one of them"
+            self._note(self.header.line, "brdf", what)
+            return np.zeros_like(theta_i_deg)
+        return np.asarray(radiance / np.cos(np.radians(theta_i_deg)))
+
+    def _u_independent(self, optional: OptionalColumns, values: FloatArray) -> FloatArray | None:
+        """Independent u (N,) in the unit of the values, where it is stated relative to them."""
+        column = columns.U_INDEPENDENT
+        u_relative = optional.numbers(column)
+        if u_relative is None:
+            return None
+        u = u_relative * np.abs(values)
+        for n in np.flatnonzero(u < U_BRDF.low):
+            what = f"of {values[n]:g} is {u[n]:g}; allowed: {U_BRDF.low:g} or more; state u_brdf"
+            optional.note(int(n), column.name, what)
+        return u
+
+    def _u_angles(self, optional: OptionalColumns, u_random: FloatArray | None) -> list[float]:
+        """Standard uncertainties of theta_i, theta_r and dphi in degrees, 0 if not stated."""
+        found = []
+        for column in columns.U_ANGLES:
+            found.append(optional.constant(column) or 0.0)
+            if found[-1] > 0 and u_random is None:
+                what = f"is stated; allowed: with u_brdf or {columns.U_INDEPENDENT.name} only"
+                self._note(self.header.line, column.name, what)
+        return found

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.data.csv_header import BRDF
+from analysis.data.csv_columns import BRDF
 from analysis.data.measurements import Measurements
 from analysis.data.text_file import TextFile, input_error, parse_number, read_text
 from instrument.errors import InputError

@@ -47,7 +47,7 @@ class Measurements:
     theta_i_deg, theta_r_deg, dphi_deg: angles in degrees; theta_r signed as in the protocol.
     brdf: in 1/sr.
     u_random: in 1/sr, noise, quantisation and drift, independent from point to point; None: not
-        stated, then every other uncertainty must be 0.
+        stated, then the fit estimates it, and those of the angles must be 0.
     lamp_setting: points with the same number share one setting of theta_i and dphi, and its errors.
     shared: further shared errors, such as those of a white tile or of the dark frames.
     u_theta_i_deg, u_theta_r_deg, u_dphi_deg: of the angles, in degrees; points with the same
@@ -86,8 +86,6 @@ class Measurements:
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         for error in self.shared:
             arrays |= {error.name: error.u_relative, f"group of {error.name}": error.group}
-            if self.u_random is None and np.any(error.u_relative != 0):
-                raise ValueError(f"{error.name} is stated, so u_random must be stated too")
         shape = (np.size(self.brdf),)
         for name, array in arrays.items():
             if array is None:

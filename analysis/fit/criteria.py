@@ -75,13 +75,16 @@ def variance_floor(problem: Problem) -> float:
 def noise_variance(m: Measurements, problem: Problem, solution: Minimum) -> float:
     """Variance of the whitened residuals: 1 where u is stated, else estimated from them.
 
-    That of a robust fit is larger, because large residuals have less weight.
+    It is also 1 where the problem's covariance holds errors that points share: beside these the
+    noise is in u, stated or estimated before. That of a robust fit is larger, because large
+    residuals have less weight.
     """
     spare = m.size - solution.x.size
+    known = m.u_random is not None or problem.covariance.common.shape[1] > 0
     if problem.huber is not None and spare > 0:
         r = problem.residual(solution.x)
-        return _robust_variance(r, problem.huber, None if m.u_random is not None else spare)
-    if m.u_random is not None:
+        return _robust_variance(r, problem.huber, None if known else spare)
+    if known:
         return 1.0
     return max(solution.chi2 / spare, variance_floor(problem))
 

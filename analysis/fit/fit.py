@@ -123,7 +123,7 @@ def refine(
     then its whole domain.
     """
     if measurements.u_random is None:
-        covariance = first.problem.covariance
+        covariance = _estimated_covariance(first, measurements, ruled_out)
         found = _solve(first, measurements, None if ruled_out else acceptance, covariance)
         return _result(measurements, found, covariance, ruled_out)
     covariance = full_covariance(measurements, smooth, first.brdf)
@@ -137,6 +137,16 @@ def refine(
     if probability(found.solution.chi2, dof) < SIGNIFICANCE:
         found = _solve(first, measurements, acceptance, wider)
     return _result(measurements, found, covariance, False)
+
+
+def _estimated_covariance(first: FirstFit, m: Measurements, ruled_out: bool) -> Covariance:
+    """Covariance where no u is stated: 1, or estimated noise beside errors that points share."""
+    known = first.problem.covariance
+    if ruled_out or not (m.shared or m.free_levels):
+        return known
+    noise = noise_variance(m, first.problem, first.solution)
+    stated = replace(m, u_random=np.sqrt(known.variance * noise))
+    return full_covariance(stated, first.brdf)
 
 
 def stated_u(result: FitResult, measurements: Measurements) -> dict[str, float]:

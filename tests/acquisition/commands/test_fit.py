@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -176,13 +177,92 @@ def test_relative_values_give_the_roughness_and_no_albedo(rough: Path, tmp_path:
     assert found["per_brdf"]["u"] is None
 
 
-def test_a_run_is_fitted_as_it_was_at_its_end(tmp_path: Path) -> None:
-    done = gonio("run", small_demo(tmp_path), "--out", tmp_path / "run", "--json")
+@pytest.mark.parametrize(
+    ("tile", "block"),
+    [
+        (True, ""),
+        (True, "fit: {method: qualitative}"),
+        (True, "fit: {models: [lambert, wolff]}"),
+        (False, "fit: {models: [lambert, wolff]}"),
+    ],
+)
+def test_a_run_and_its_table_are_fitted_as_at_the_run_s_end(
+    tile: bool, block: str, tmp_path: Path
+) -> None:
+    """Fits of the folder follow the protocol's `fit:`; a table has the numbers alone."""
+    protocol = small_demo(tmp_path)
+    text = protocol.read_text() + block + "\n"
+    protocol.write_text(text if tile else re.sub(r"  white_tile:.*\n", "", text))
+    done = gonio("run", protocol, "--out", tmp_path / "run", "--json")
+    at_end = json.loads(done.stdout)
+    assert at_end["candidates"]
     again = gonio("fit", tmp_path / "run", "--json")
-    assert again.returncode == 0, again.stderr
-    assert json.loads(again.stdout) == json.loads(done.stdout)
-    table_only = gonio("fit", tmp_path / "run" / "measurements.csv", "--json")
-    assert json.loads(table_only.stdout)["chosen"] == json.loads(done.stdout)["chosen"]
+    assert json.loads(again.stdout) == at_end
+    options = {"": (), "fit: {method: qualitative}": ("--method", "qualitative")}
+    options = options.get(block, ("--models", "lambert,wolff"))
+    table_alone = gonio("fit", tmp_path / "run" / "measurements.csv", *options, "--json")
+    assert json.loads(table_alone.stdout) == at_end
+
+
+def test_options_go_before_the_fit_block_of_a_run(tmp_path: Path) -> None:
+    protocol = small_demo(tmp_path)
+    protocol.write_text(protocol.read_text() + "fit: {models: [lambert]}\n")
+    gonio("run", protocol, "--out", tmp_path / "run", "--json")
+    done = gonio("fit", tmp_path / "run", "--models", "wolff", "--json")
+    assert json.loads(done.stdout)["chosen"] == "wolff"
+    done = gonio("fit", tmp_path / "run", "--method", "qualitative", "--json")
+    assert len(json.loads(done.stdout)["candidates"]) > 1
+    refused = gonio("fit", tmp_path / "run", "--u-shared", "1%")
+    assert refused.returncode == 2
+    assert "--u-shared: 0.01 for a run, which states its own shared errors" in refused.stderr
+
+
+def notes(done: subprocess.CompletedProcess[str]) -> dict[str, str]:
+    return {note["code"]: note["text"] for note in json.loads(done.stdout)["notes"]}
+
+
+def test_what_a_table_does_not_state_is_named_as_assumed(rough: Path) -> None:
+    options = ("--models", "lambert,oren_nayar")
+    found = notes(gonio("fit", rough, *options, "--json"))
+    assert set(found) >= {
+        "assumed_no_shared_error", "assumed_exact_angles", "assumed_small_acceptance",
+    }  # fmt: skip
+    printed = " ".join(gonio("fit", rough, *options).stdout.split())
+    assert all(text in printed for text in found.values())
+    stated = notes(gonio("fit", rough, *options, "--u-shared", "0.5%", "--json"))
+    assert "assumed_no_shared_error" not in stated
+    assert stated["u_shared"] == "all values share an error of 0.5 % (--u-shared)"
+
+
+@pytest.mark.parametrize("with_u", [True, False], ids=["u_brdf", "no u"])
+@pytest.mark.parametrize("u_shared", ["2%", "0.02", " 2 % "])
+def test_a_u_that_all_values_share_widens_that_of_the_albedo(
+    with_u: bool, u_shared: str, rough: Path, tmp_path: Path
+) -> None:
+    """A common factor changes Lambert's albedo by itself: variances add."""
+    path = tmp_path / "table.csv"
+    path.write_text(table(path, "lambert", (30.0, 60.0), albedo=0.8).read_text())
+    if not with_u:
+        rows = [line.split(",")[:4] for line in path.read_text().splitlines()]
+        path.write_text("\n".join(map(",".join, rows)))
+
+    def albedo(*options: str) -> dict[str, float]:
+        done = gonio("fit", path, "--models", "lambert", "--json", *options)
+        found: dict[str, float] = json.loads(done.stdout)["candidates"][0]["parameters"]["albedo"]
+        return found
+
+    alone, both = albedo(), albedo("--u-shared", u_shared)
+    assert both["value"] == pytest.approx(alone["value"], rel=1e-4)
+    expected = np.hypot(alone["u"], 0.02 * alone["value"])
+    assert both["u"] == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize("text", ["0", "0%", "50%", "0.5", "-1%", "nan", "much", "", "%", "1e-400"])
+def test_a_wrong_u_shared_is_named_with_what_is_allowed(text: str, rough: Path) -> None:
+    done = gonio("fit", rough, f"--u-shared={text}")
+    assert done.returncode == 2
+    assert done.stderr.startswith("--u-shared: ")
+    assert "allowed: more than 0 and less than 50 %, as 0.5% or 0.005" in done.stderr
 
 
 def test_a_folder_that_is_no_run_says_what_to_name(tmp_path: Path) -> None:

@@ -12,11 +12,18 @@ import pytest
 
 from acquisition.engine.engine import Engine
 from acquisition.plan.plan import make_plan
+from acquisition.results.fitting import measurements
 from acquisition.results.measurements_csv import COLUMNS, measurements_csv
 from acquisition.results.reduction import Reduced, reduce
 from acquisition.rig import open_devices
+from analysis.data.acceptance import Acceptance
+from analysis.data.csv_table import read_table
+from analysis.data.measurements import Measurements
+from instrument.config.load import Loaded
+from instrument.config.protocol import References
 from instrument.record.record import Record
-from tests.support.scans import small_scan
+from tests.support.scans import changed, small_scan
+from tests.support.stopped_scan import scan
 
 
 @pytest.fixture(scope="module")
@@ -30,8 +37,12 @@ def reduced(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Reduced]:
         yield reduce(record.readings(), loaded.protocol, record.checks())
 
 
+def text(reduced: Reduced) -> str:
+    return measurements_csv(reduced, 0.01 * reduced.brdf, small_scan())
+
+
 def table(reduced: Reduced) -> list[dict[str, str]]:
-    return list(csv.DictReader(measurements_csv(reduced, 0.01 * reduced.brdf).splitlines()))
+    return list(csv.DictReader(text(reduced).splitlines()))
 
 
 def test_a_row_holds_a_point_and_each_component_of_its_u(reduced: Reduced) -> None:
@@ -52,3 +63,74 @@ def test_a_value_that_is_not_known_is_an_empty_cell(reduced: Reduced) -> None:
     rows = table(replace(reduced, brdf=brdf))
     assert (rows[1]["brdf"], rows[1]["u_brdf"]) == ("", "")
     assert float(rows[0]["brdf"]) > 0
+
+
+def test_the_table_states_the_rig_and_the_groups_of_shared_errors(reduced: Reduced) -> None:
+    rows, rig = table(reduced), small_scan().rig
+    assert {row["beam_length_mm"] for row in rows} == {repr(float(rig.beam_length_mm))}
+    assert {row["u_theta_r_deg"] for row in rows} == {repr(float(rig.axes.theta_r.u_deg))}
+    assert {row["group_white_tile_certificate"] for row in rows} == {"1"}
+    tile = [float(row["u_shared_white_tile_certificate_relative"]) for row in rows]
+    assert tile == pytest.approx([0.005 / 0.99] * len(rows))
+    assert sorted({row["lamp_setting"] for row in rows}) == ["1", "2"]
+    assert {row["group_white_tile_reading"] for row in rows} == {"1", "2"}
+
+
+def random_case(seed: int) -> tuple[Loaded, int | None, Loaded]:
+    """A small scan of random length and noise, with or without references; perhaps stopped.
+
+    Returns the scan, the step after which it stops and is resumed (None: it does not stop), and
+    what it is resumed with: perhaps a darker lamp.
+    """
+    random = np.random.default_rng([13, 2, seed])
+    loaded = small_scan(rig=str(random.choice(["bench_12bit", "paper_1995"])), shrink=8)
+    views = np.linspace(-70, 70, int(random.integers(4, 9))).round(3).tolist()
+    sweep = {
+        "theta_i_deg": random.choice([0.0, 20.0, 45.0, 65.0], 2, replace=False).tolist(),
+        "dphi_deg": [0.0] if random.random() < 0.6 else [0.0, 37.5],
+        "theta_r_deg": views,
+    }
+    old = loaded.protocol.references
+    kept = {name: getattr(old, name) for name in ("white_tile", "drift_check")}
+    references = References(**{name: r for name, r in kept.items() if random.random() < 0.7})
+    rig = {"simulation": loaded.rig.simulation.model_copy(update={"seed": seed})}
+    target = float(random.choice([0.1, 0.7, 0.99]))  # near saturation some points are flagged
+    scan = changed(loaded, rig=rig, sweeps=[sweep], references=references, exposure_target=target)
+    stop = int(random.integers(3, 16)) if random.random() < 0.5 else None
+    lamp = scan.rig.lamp
+    darker = lamp.model_copy(
+        update={"white_electrons_per_s": random.choice([0.8, 1.0]) * lamp.white_electrons_per_s}
+    )
+    return scan, stop, changed(scan, rig={"lamp": darker})
+
+
+@pytest.mark.slow
+def test_the_table_holds_exactly_what_the_fit_takes(tmp_path: Path, slow: bool) -> None:
+    """Every number, group and name; random protocols and seeds, stopped, resumed, flagged."""
+    kinds = set()
+    for seed in range(200 if slow else 12):
+        loaded, stop, resumed = random_case(seed)
+        with Record.create(tmp_path / str(seed), {}) as record:
+            scan(loaded, record, stop)
+            if stop is not None and seed % 3:
+                scan(resumed, record)
+            found = reduce(record.readings(), loaded.protocol, record.checks())
+        path = tmp_path / f"{seed}.csv"
+        path.write_text(measurements_csv(found, 0.01 * found.brdf, loaded))
+        read = read_table(path)
+        assert read.flagged == np.sum(~found.valid)
+        if not np.any(found.valid):
+            assert read.measurements.size == 0
+            continue
+        assert read.acceptance == Acceptance.of(loaded.rig, loaded.protocol.window)
+        assert plain(read.measurements) == plain(measurements(found, loaded))
+        kinds.add((found.has_brdf, stop is None, read.flagged > 0))
+    assert len(kinds) >= 4
+
+
+def plain(m: Measurements) -> dict[str, object]:
+    """All values as lists; the groups of a shared error are numbers of their own."""
+    values = {name: getattr(m, name) for name in Measurements.__slots__ if name != "shared"}
+    lists = {n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in values.items()}
+    errors = [(e.name, e.u_relative.tolist(), e.group.tolist()) for e in m.shared]
+    return lists | {"shared": errors}

@@ -61,15 +61,21 @@ def test_equivalent_notations_of_a_table(kind: str) -> None:
 
 
 def test_the_measurements_of_a_run() -> None:
-    """Columns of a run's own table; flagged rows are read like any other."""
+    """Columns of a run's own table; flagged rows are left out, whatever they hold."""
     header = "theta_i_deg,theta_r_deg,dphi_deg,radiance,u_radiance,brdf,u_brdf,window_pixels"
     m = read(
         f"{header},exposure_s,frames,flags,time_utc,u_noise_relative\n"
         "30.0,-20.0,0.0,812.5,1.6,0.231,0.0011,9876.00,0.02,4,,2024-05-04T10:00:00Z,0.001\n"
-        '30.0,0.0,0.0,790.1,1.6,0.225,0.0011,9876.00,0.02,4,"saturated; small",,0.001\n'
+        '30.0,0.0,0.0,790.1,1.6,,,9876.00,0.02,4,"saturated; small",,0.001\n'
     )
-    assert m.brdf.tolist() == [0.231, 0.225]
-    assert m.theta_r_deg.tolist() == [-20.0, 0.0]
+    assert m.brdf.tolist() == [0.231]
+    assert m.theta_r_deg.tolist() == [-20.0]
+    assert not m.relative
+
+
+def test_a_table_of_flagged_rows_alone_has_no_rows_to_fit() -> None:
+    m = read("theta_i_deg,theta_r_deg,dphi_deg,brdf,flags\n30,0,0,.2,dark\n30,10,0,,dark\n")
+    assert m.size == 0
 
 
 def test_one_direction_by_other_angles_is_another_setting() -> None:
@@ -222,10 +228,23 @@ def test_a_mistake_in_a_row_is_reported_with_its_position(kind: str) -> None:
 
 
 def test_an_empty_brdf_in_every_row_has_its_own_message() -> None:
-    header = "theta_i_deg,theta_r_deg,dphi_deg,radiance,brdf,u_brdf\n"
+    header = "theta_i_deg,theta_r_deg,dphi_deg,power,brdf,u_brdf\n"
     assert problems(header + "30,0,0,812.5,,\n30,10,0,790.1, ,\n") == (
-        "data.csv:1:43: brdf: is empty in every row: no reference was taken, so there is no BRDF"
-        " to fit; allowed: a scan with a white tile",
+        "data.csv:1:40: brdf: is empty in every row: no reference was taken, so there is no BRDF"
+        " to fit; allowed: a scan with a white tile, or a column radiance",
+    )
+
+
+def test_radiance_alone_is_read_relative_to_the_level_of_each_lamp_setting() -> None:
+    header = "theta_i_deg,theta_r_deg,dphi_deg,radiance,brdf,u_brdf\n"
+    m = read(header + "60,0,0,812.5,,\n60,10,0,790.1, ,\n")
+    assert (m.relative, m.free_levels) == (True, True)
+    np.testing.assert_allclose(m.brdf, [1625.0, 1580.2])  # over cos 60 degrees
+
+
+def test_radiance_and_brdf_are_not_both_empty() -> None:
+    assert problems("theta_i_deg,theta_r_deg,dphi_deg,radiance,brdf\n60,0,0,,\n") == (
+        "data.csv:1:43: brdf: is empty in every row, and so is radiance; allowed: one of them",
     )
 
 

@@ -16,10 +16,6 @@ from tests.support.analysis.seeded_scan import scan
     [
         ({"u_random": np.zeros(2)}, "u_random = 0 1/sr"),
         ({"u_random": None, "u_dphi_deg": 0.01}, "u_random must be stated"),
-        (
-            {"u_random": None, "shared": (SharedError.common_to_all("tile", 0.01, 2),)},
-            "tile is stated",
-        ),
         ({"u_dphi_deg": -1.0}, "u_dphi_deg = -1"),
         ({"brdf": np.array([0.2, np.nan])}, "brdf holds a value that is not finite"),
         ({"theta_i_deg": np.array([30.0, 95.0])}, "theta_i = 95"),
