@@ -19,12 +19,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.accuracy.method import Method, MethodFamily
+from analysis.accuracy.method import Method, MethodFamily, relative_error
 from analysis.models.base import Ranges
 from analysis.models.lambert import DARKEST
 from instrument.geometry import BoolArray, FloatArray, Geometry, IntArray
@@ -33,29 +34,27 @@ CHECKS = 256
 """Largest number of doubtful geometries that are checked against the reference."""
 
 _FEW = 4  # of the worst, with which a check begins
-# Steps of a range, by the number of ranges: to refute a method, and, in rounds, to accept it.
-_COARSE_STEPS = {1: 3, 2: 3}
-_FINE_STEPS = ({1: 17, 2: 9}, {1: 17, 2: 9}, {1: 33, 2: 17}, {1: 65, 2: 33})
+# Steps of a range of sigma: to refute a method, and, in rounds, to accept it.
+_COARSE_STEPS = 3
+_FINE_STEPS = (17, 17, 33, 65)
 _ACCURATE = 20.0  # a reference is so many times more accurate than the tolerance it checks
-_DECADES = 1e-3  # of its upper end, at which a range on a logarithmic scale begins
+_REFERENCES = ("exact", "fine")
+_TABLE = "table"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Adequate:
     """Result of `cheapest`. Errors are relative, the largest over geometries and ranges.
 
-    predicted: by the method's bound. checked: against the reference, at `pairs` pairs of a
-    geometry and parameters. cost: of `uses` evaluations, in functional forms of one geometry;
-    cost_of_best: of the most accurate method. brdf: the method's kernel.
+    predicted: by the method's bound. checked: against the reference. cost: in functional forms of
+    one geometry. brdf: the method's kernel.
     """
 
     method: str
     brdf: Callable[..., FloatArray]
     predicted: float
     checked: float
-    pairs: int
     cost: float
-    cost_of_best: float
 
 
 def cheapest(
@@ -64,16 +63,15 @@ def cheapest(
     ranges: Ranges,
     tolerance: ArrayLike,
     *,
-    uses: int = 1,
     checks: int = CHECKS,
     among: Sequence[str] | None = None,
 ) -> Adequate:
     """The cheapest method of a family that keeps a relative tolerance in a scene.
 
     `geometry`: any shape. `ranges`: lowest and highest value of every parameter; equal where it is
-    known. `tolerance`: one for all, or one for each geometry. `uses`: number of evaluations of the
-    scene, each with other parameters: an integral that is costly once is cheap the next time.
-    `among`: names of the methods to choose from; the most accurate one is always included.
+    known. `tolerance`: one for all, or one for each geometry. `checks`: largest number of doubtful
+    geometries that are checked. `among`: names of the methods to choose from; the most accurate one
+    is always included.
 
     Raises `ValueError` for a tolerance that not even the most accurate method keeps, a range that
     falls or leaves its parameter's domain, or one that is missing; `KeyError` for an unknown
@@ -84,7 +82,7 @@ def cheapest(
     scene = _Scene(family, _flat(geometry), ranges, tolerances, checks)
     names = [m.name for m in family.methods] if among is None else list(among)
     methods = [family[name] for name in dict.fromkeys((*names, family.reference.name))]
-    costs = {m.name: m.cost(scene.geometry, ranges).of(scene.size, uses) for m in methods}
+    costs = {m.name: m.cost.of(scene.size) for m in methods}
     # Of two that cost the same the more accurate one, which stands later.
     for method in sorted(methods, key=lambda m: (costs[m.name], -family.methods.index(m))):
         predicted, checked = scene.judge(method)
@@ -95,43 +93,36 @@ def cheapest(
         brdf=method.kernel,
         predicted=predicted,
         checked=checked or 0.0,
-        pairs=scene.pairs,
         cost=costs[method.name],
-        cost_of_best=costs[family.reference.name],
     )
 
 
 class _Errors(NamedTuple):
     """Bounds from below and above on the largest error at some geometries over ranges.
 
-    least: (n,), the largest error found, less the reference's own. most: (..., n), at each of the
-    parameters in `axes` and around it, plus the reference's own and what may lie between.
+    least: (n,), the largest error found, less the reference's own. most: (sigma, n), at each of
+    `sigmas_deg` and around it, plus the reference's own and what may lie between.
     """
 
     least: FloatArray
     most: FloatArray
-    axes: dict[str, list[float]]
+    sigmas_deg: list[float]
 
-    def ranges_around(self, above: BoolArray) -> Ranges:
-        """The ranges that hold the marked parameters (...,) and those next to them."""
-        found = {}
-        for k, (name, values) in enumerate(self.axes.items()):
-            others = tuple(axis for axis in range(above.ndim) if axis != k)
-            at = np.flatnonzero(above.any(axis=others))
-            found[name] = (values[max(at[0] - 1, 0)], values[min(at[-1] + 1, len(values) - 1)])
-        return found
+    def range_around(self, above: BoolArray) -> tuple[float, float]:
+        """The range of sigma that holds the marked steps (sigma,) and those next to them."""
+        at, last = np.flatnonzero(above), len(self.sigmas_deg) - 1
+        return self.sigmas_deg[max(at[0] - 1, 0)], self.sigmas_deg[min(at[-1] + 1, last)]
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _Scene:
-    """Geometries (N,), ranges and tolerances (N,) of one search; `pairs` counts the checks."""
+    """Geometries (N,), ranges and tolerances (N,) of one search."""
 
     family: MethodFamily
     geometry: Geometry
     ranges: Ranges
     tolerance: FloatArray
     checks: int
-    pairs: int = 0
 
     @property
     def size(self) -> int:
@@ -188,38 +179,36 @@ class _Scene:
             if self._fails(doubtful, found):
                 return None
             above: BoolArray = np.asarray(found.most > self.tolerance[doubtful])
-            doubtful = doubtful[above.any(axis=tuple(range(above.ndim - 1)))]
+            doubtful = doubtful[above.any(axis=0)]
             if not doubtful.size:
                 return so_far
-            ranges = found.ranges_around(np.asarray(above.any(axis=-1)))
+            ranges = {**ranges, "sigma_deg": found.range_around(np.asarray(above.any(axis=1)))}
         return None
 
     def _fails(self, at: IntArray, found: _Errors) -> bool:
         return bool(np.any(found.least > self.tolerance[at]))
 
     def _errors(
-        self,
-        method: Method,
-        at: IntArray,
-        steps: dict[int, int],
-        ranges: Ranges,
-        reference: Method,
+        self, method: Method, at: IntArray, steps: int, ranges: Ranges, reference: Method
     ) -> _Errors:
-        """Error at some geometries over some ranges, against a reference."""
+        """Error at some geometries over some ranges, against a reference.
+
+        Errors are monotone between the ends of a range of albedos.
+        """
         geometry = self._geometries(at)
-        stepped = self._stepped(ranges)
-        axes = {name: self._values(name, ranges, steps[max(sum(stepped), 1)]) for name in ranges}
-        errors = np.empty((*map(len, axes.values()), at.size))
-        for place in np.ndindex(errors.shape[:-1]):
-            values = {n: v[i] for (n, v), i in zip(axes.items(), place, strict=True)}
-            exact = reference.kernel(geometry, **values)
-            errors[place] = self.family.relative_error(method.kernel(geometry, **values), exact)
-        self.pairs += errors.size
+        darkest, brightest = ranges["albedo"]
+        albedos = sorted({max(darkest, DARKEST * brightest), brightest})
+        low, high = ranges["sigma_deg"]
+        sigmas = [high] if low == high else [float(v) for v in np.linspace(low, high, steps)]
+        errors = np.empty((len(albedos), len(sigmas), at.size))
+        for (k, albedo), (row, sigma) in product(enumerate(albedos), enumerate(sigmas)):
+            found, exact = (m.kernel(geometry, albedo, sigma) for m in (method, reference))
+            errors[k, row] = relative_error(found, exact)
         own = reference.bound(geometry, ranges)
-        largest = np.abs(errors).max(axis=tuple(range(errors.ndim - 1)))
+        largest = np.abs(errors).max(axis=(0, 1))
         least = np.maximum(largest - own * (1 + largest), 0.0)
-        most = _between(errors, stepped)
-        return _Errors(least, most + own * (1 + most), axes)
+        most = _between(errors).max(axis=0)
+        return _Errors(least, most + own * (1 + most), sigmas)
 
     def _reference(self, method: Method, at: IntArray) -> Method:
         """The first method after this one that is accurate enough there to check it."""
@@ -239,46 +228,21 @@ class _Scene:
         known = np.isfinite(table.bound(self._geometries(at), self.ranges))
         return table if known.all() else None
 
-    def _values(self, name: str, ranges: Ranges, count: int) -> list[float]:
-        """Values of a parameter at which the error is evaluated."""
-        low, high = ranges[name]
-        sampling = self.family.sampling[name]
-        if sampling == "high" or low == high:
-            return [high]
-        if sampling == "ends":
-            return [max(low, DARKEST * high), high]
-        if sampling == "even":
-            return [float(v) for v in np.linspace(low, high, count)]
-        start = max(low, _DECADES * high)
-        steps = [float(v) for v in np.geomspace(start, high, count)]
-        return [low, *steps] if low < start else steps
-
-    def _stepped(self, ranges: Ranges) -> list[bool]:
-        """True for each range that is sampled in steps."""
-        kinds = self.family.sampling
-        return [kinds[n] in ("even", "log") and low < high for n, (low, high) in ranges.items()]
-
     def _geometries(self, at: IntArray) -> Geometry:
         g = self.geometry
         return Geometry(g.theta_i_deg[at], g.theta_r_deg[at], g.dphi_deg[at])
 
 
-_REFERENCES = ("exact", "fine", "adaptive")
-_TABLE = "table"
-
-
-def _between(errors: FloatArray, stepped: Sequence[bool]) -> FloatArray:
-    """Largest size of errors (..., n) at each step of the ranges and around it.
+def _between(errors: FloatArray) -> FloatArray:
+    """Largest size of errors (albedo, sigma, n) at each step of sigma and around it.
 
     Between the nodes of a smooth curve lies at most an eighth of its second difference there;
     twice that is allowed.
     """
     most = np.abs(errors)
-    for axis, moves in enumerate(stepped):
-        if moves and errors.shape[axis] > 2:
-            bend = np.abs(np.diff(errors, 2, axis=axis)) / 4
-            edges = [(1, 1) if k == axis else (0, 0) for k in range(errors.ndim)]
-            most = most + np.pad(bend, edges, mode="edge")
+    if errors.shape[1] > 2:
+        bend = np.abs(np.diff(errors, 2, axis=1)) / 4
+        most = most + np.pad(bend, ((0, 0), (1, 1), (0, 0)), mode="edge")
     return most
 
 

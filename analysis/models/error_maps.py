@@ -1,7 +1,7 @@
 """Reader of the stored error maps: the largest error of each approximate method, cell by cell.
 
-What to use when: `rough.form_bounds` and the bounds in `analysis.accuracy`, which look errors up
-here; `acquisition.benchmark.maps.make_error_maps` to compute the file.
+What to use when: `rough.form_bounds` and `acquisition.benchmark.maps.smooth_dielectric`, which look
+errors up here; `acquisition.benchmark.maps.make_error_maps` to compute the file.
 
 `error_maps.npz` holds errors as levels of one byte, rounded up:
 
@@ -12,9 +12,6 @@ rough      sigma, larger angle, smaller over larger,    Lambert, (36), (33)+(34)
            dphi (the grid of `form_error_table`)        `form_error_table`, and the coarse rule
 smooth     n, sqrt(1 - rho), angle of one ray           Chandrasekhar's H of some orders: the
                                                         lamp's ray, and the camera's with its K
-lobe       ln g, ln q of `beckmann_spizzichino`         the sum's limits g << 1 and g >> 1, its
-                                                        first 10 and 100 terms; relative, and
-                                                        absolute for wings too faint to measure
 =========  ===========================================  ========================================
 
 A cell's value is the largest error found in it, its corners included, and a margin for what lies
@@ -27,7 +24,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,31 +35,25 @@ Levels = NDArray[np.uint8]
 FILE = Path(__file__).with_name("error_maps.npz")
 
 
-class Scale(NamedTuple):
-    """Logarithmic scale of errors in a byte: 0 is `least` or less, then `per_octave` levels."""
-
-    least: float
-    per_octave: int
-
-    def levels(self, errors: FloatArray) -> Levels:
-        """Bytes of errors (any shape, a ratio), rounded up; 255 is without limit."""
-        octaves = np.log2(np.maximum(errors, self.least) / self.least)
-        return np.minimum(np.ceil(octaves * self.per_octave - 1e-9), 255).astype(np.uint8)
-
-    def errors(self, levels: Levels) -> FloatArray:
-        """Errors of bytes (any shape, a ratio): never smaller than those stored."""
-        found = self.least * np.exp2(levels / self.per_octave)
-        return np.where(levels == 255, np.inf, found)
+_LEAST, _PER_OCTAVE = 1e-8, 8  # logarithmic scale: level 0 is an error of _LEAST or less
 
 
-RELATIVE = Scale(1e-8, 8)
-ABSOLUTE = Scale(1e-22, 3)
+def levels_of(errors: FloatArray) -> Levels:
+    """Bytes of relative errors (any shape, a ratio), rounded up; 255 is without limit."""
+    octaves = np.log2(np.maximum(errors, _LEAST) / _LEAST)
+    return np.minimum(np.ceil(octaves * _PER_OCTAVE - 1e-9), 255).astype(np.uint8)
+
+
+def errors_of(levels: Levels) -> FloatArray:
+    """Relative errors of bytes (any shape, a ratio): never smaller than those stored."""
+    found = _LEAST * np.exp2(levels / _PER_OCTAVE)
+    return np.where(levels == 255, np.inf, found)
 
 
 @cache
 def maps() -> Mapping[str, Levels]:
     """The maps: `rough` (method, sigma, larger, ratio, dphi), `smooth_lamp`, `smooth_camera`
-    (order, n, root, theta), `lobe`, `lobe_absolute` (method, ln g, ln q).
+    (order, n, root, theta).
     """
     with np.load(FILE) as file:
         found: dict[str, Levels] = {name: file[name] for name in file.files}

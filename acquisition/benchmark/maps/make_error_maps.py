@@ -11,10 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.benchmark.maps import beckmann_lobe, smooth_dielectric
-from acquisition.benchmark.maps.beckmann_lobe import lobe_sums
+from acquisition.benchmark.maps import smooth_dielectric
 from acquisition.benchmark.maps.smooth_dielectric import ORDERS
-from analysis.models.error_maps import ABSOLUTE, FILE, RELATIVE, Levels
+from analysis.models.error_maps import FILE, Levels, levels_of
 from analysis.models.lambert import DARKEST, lambert_brdf
 from analysis.models.rough import form_error_table
 from analysis.models.rough.form_bounds import MAPPED
@@ -26,7 +25,6 @@ from analysis.models.rough.oren_nayar_exact import (
 )
 from analysis.models.rough.oren_nayar_forms import oren_nayar_brdf, oren_nayar_qualitative_brdf
 from analysis.models.smooth.wolff import ray_terms
-from analysis.models.specular.beckmann_spizzichino import poisson_sum
 from instrument.geometry import FloatArray, Geometry, IntArray
 
 _MARGIN = 0.15  # of the change of a form's error within a cell
@@ -36,15 +34,7 @@ _REFERENCE = 1e-6  # relative error of the rule that the rough maps are made wit
 
 def error_maps() -> dict[str, Levels]:
     """All maps, in levels of one byte; axes as in `analysis.models.error_maps.maps`."""
-    lamp, camera = _smooth_maps()
-    relative, absolute = lobe_maps()
-    return {
-        "rough": RELATIVE.levels(_rough_maps()),
-        "smooth_lamp": RELATIVE.levels(lamp),
-        "smooth_camera": RELATIVE.levels(camera),
-        "lobe": RELATIVE.levels(relative),
-        "lobe_absolute": ABSOLUTE.levels(absolute),
-    }
+    return {n: levels_of(errors) for n, errors in {"rough": _rough_maps(), **smooth_maps()}.items()}
 
 
 def write(file: Path = FILE) -> None:
@@ -128,8 +118,11 @@ def _neighbours(errors: FloatArray) -> FloatArray:
 # The smooth dielectric.
 
 
-def _smooth_maps(parts: int = 3) -> tuple[FloatArray, FloatArray]:
-    """Largest |ln| of (approximate / exact) of the lamp's and of the camera's ray, each cell."""
+def smooth_maps(parts: int = 3) -> dict[str, FloatArray]:
+    """Largest |ln| of (approximate / exact) of the lamp's and of the camera's ray, each cell.
+
+    Each (order, n, root, theta), with a cell's errors found at `parts` + 1 values of an axis.
+    """
     n, root, theta_deg = (_finer(axis, parts) for axis in smooth_dielectric.GRID.values())
     theta = np.radians(theta_deg)
     lamp = np.empty((len(ORDERS), n.size, root.size, theta.size))
@@ -141,26 +134,7 @@ def _smooth_maps(parts: int = 3) -> tuple[FloatArray, FloatArray]:
             H, rest = ray_terms(theta, rho, float(n[i]), order)
             lamp[k, i, j] = np.log(H / exact_H)
             camera[k, i, j] = np.log(H * exact_rest / (exact_H * rest))
-    return _coarser(lamp, parts, 3), _coarser(camera, parts, 3)
-
-
-# The lobe.
-
-
-def lobe_maps(parts: int = 4) -> tuple[FloatArray, FloatArray]:
-    """Largest relative and absolute errors of the lobe's sum, each of shape (method, g, q)."""
-    g, q = (np.exp(_finer(_from_zero(axis), parts)) for axis in beckmann_lobe.GRID.values())
-    g, q = np.meshgrid(g, q, indexing="ij")
-    exact = poisson_sum(g, q, lambda m, *_: 1 / m)
-    errors = np.stack([found - exact for found in lobe_sums(g, q)])
-    tiny = np.maximum(exact, np.finfo(np.float64).tiny)
-    relative = np.minimum(np.abs(errors) / tiny, 1e300) * np.sign(errors)
-    return _coarser(relative, parts, 2), _coarser(errors, parts, 2)
-
-
-def _from_zero(ln_edges: FloatArray) -> FloatArray:
-    """Edges with the first replaced by one that stands for 0."""
-    return np.concatenate([[ln_edges[0] - 40.0], ln_edges[1:]])
+    return {"smooth_lamp": _coarser(lamp, parts), "smooth_camera": _coarser(camera, parts)}
 
 
 def _finer(edges: FloatArray, parts: int) -> FloatArray:
@@ -169,14 +143,11 @@ def _finer(edges: FloatArray, parts: int) -> FloatArray:
     return np.interp(position, np.arange(edges.size), edges)
 
 
-def _coarser(signed: FloatArray, parts: int, axes: int) -> FloatArray:
-    """Bound of each cell from signed errors at the nodes of `_finer`, over the last `axes`."""
-    windows = np.lib.stride_tricks.sliding_window_view(
-        signed, (parts + 1,) * axes, tuple(range(-axes, 0))
-    )
-    every = (slice(None),) * (signed.ndim - axes) + (slice(None, None, parts),) * axes
-    nodes = windows[every]
-    over = tuple(range(-axes, 0))
+def _coarser(signed: FloatArray, parts: int) -> FloatArray:
+    """Bound of each cell from signed errors at the nodes of `_finer`, over the last three axes."""
+    over = (-3, -2, -1)
+    windows = np.lib.stride_tricks.sliding_window_view(signed, (parts + 1,) * 3, over)
+    nodes = windows[:, ::parts, ::parts, ::parts]
     return np.asarray(np.abs(nodes).max(axis=over) + _MARGIN * np.ptp(nodes, axis=over))
 
 

@@ -1,4 +1,4 @@
-"""Methods for Wolff's smooth dielectric: polynomial Fresnel, and Chandrasekhar's H of finite order.
+"""Error bounds of two approximations of Wolff's dielectric: polynomial F, and H of finite order.
 
 They save little. The exact H and K are two short series in one variable, made once for each pair of
 parameters: an order saves a fifth to two fifths of making them (0.35 ms in all), the polynomial a
@@ -9,15 +9,11 @@ work that used them.
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
-from analysis.accuracy.method import Method, MethodFamily, constant_bound, fixed_cost
 from analysis.models.base import Ranges
-from analysis.models.error_maps import RELATIVE, cell_at, cells_of, maps
+from analysis.models.error_maps import cell_at, cells_of, errors_of, maps
 from analysis.models.smooth.fresnel import transmittance, wolff_polynomial
-from analysis.models.smooth.wolff import SINGLE_SCATTERING_ALBEDO, N, wolff_brdf
 from instrument.geometry import FloatArray, Geometry
 
 EPSILON = 0.07
@@ -71,24 +67,5 @@ def order_bound(order: int, geometry: Geometry, ranges: Ranges) -> FloatArray:
     rays = (("smooth_lamp", geometry.theta_i_deg), ("smooth_camera", geometry.theta_r_deg))
     for name, theta_deg in rays:
         levels = maps()[name][ORDERS.index(order)][cells].max(axis=(0, 1))
-        total += RELATIVE.errors(levels)[cell_at(GRID["theta_deg"], theta_deg)]
+        total += errors_of(levels)[cell_at(GRID["theta_deg"], theta_deg)]
     return np.asarray(np.expm1(total))
-
-
-def _order(order: int) -> Method:
-    kernel, bound = partial(wolff_brdf, order=order), partial(order_bound, order)
-    return Method(f"order {order}", kernel, bound, fixed_cost(3400 + 20 * order, 4))
-
-
-_POLYNOMIAL = partial(wolff_brdf, epsilon=EPSILON)
-
-SMOOTH_DIELECTRIC = MethodFamily(
-    "smooth",
-    (SINGLE_SCATTERING_ALBEDO, N),
-    (
-        Method("polynomial", _POLYNOMIAL, polynomial_bound, fixed_cost(4000, 4)),
-        *map(_order, ORDERS),
-        Method("exact", wolff_brdf, constant_bound(1e-10), fixed_cost(4500, 4)),
-    ),
-    {"single_scattering_albedo": "even", "n": "even"},
-)

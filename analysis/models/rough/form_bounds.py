@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.models.base import Ranges
-from analysis.models.error_maps import RELATIVE, cell_at, cells_of, maps
+from analysis.models.error_maps import cell_at, cells_of, errors_of, maps
 from analysis.models.lambert import DARKEST
 from analysis.models.rough.form_error import form_error
 from analysis.models.rough.form_error_table import GRID, LIMIT_DEG, table_coordinates
@@ -38,7 +38,7 @@ def map_bound(name: str, geometry: Geometry, ranges: Ranges) -> FloatArray:
         cell_at(GRID["ratio"], ratio),
         cell_at(GRID["dphi_deg"], dphi),
     )
-    bound = np.minimum(RELATIVE.errors(levels[at]), _STATED.get(name, np.inf))
+    bound = np.minimum(errors_of(levels[at]), _STATED.get(name, np.inf))
     return np.where(larger > LIMIT_DEG, np.inf, bound)
 
 

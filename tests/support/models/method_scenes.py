@@ -1,26 +1,16 @@
-"""Random scenes for the methods of `analysis.accuracy`: angles, ranges and values in them."""
+"""Random scenes for bounds on errors of methods: angles, ranges and values in them."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from acquisition.benchmark.maps.beckmann_lobe import BECKMANN_LOBE
-from acquisition.benchmark.maps.smooth_dielectric import SMOOTH_DIELECTRIC
-from analysis.accuracy.method import MethodFamily
-from analysis.accuracy.rough_surface import ROUGH_SURFACE
-from analysis.models.base import Ranges
+from analysis.models.base import Parameter, Ranges
 from analysis.models.rough.form_error_table import LIMIT_DEG
 from instrument.geometry import Geometry
 
 Random = np.random.Generator
-
-FAMILIES = {f.name: f for f in (ROUGH_SURFACE, SMOOTH_DIELECTRIC, BECKMANN_LOBE)}
-
-SPANS: dict[str, tuple[float, float]] = {  # drawn uniformly in the logarithm
-    "scale": (1e-3, 10.0),
-    "sigma_h": (1e-2, 100.0),
-    "correlation_length": (0.1, 1000.0),
-}
 
 
 def angles(random: Random, count: int, limit_deg: float = LIMIT_DEG) -> Geometry:
@@ -35,18 +25,14 @@ def angles(random: Random, count: int, limit_deg: float = LIMIT_DEG) -> Geometry
     return Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
 
 
-def drawn_ranges(random: Random, family: MethodFamily, points: float = 0.5) -> dict[str, tuple]:
-    """A range of each parameter, or, with the probability `points`, a known value."""
+def drawn_ranges(random: Random, parameters: Iterable[Parameter]) -> dict[str, tuple[float, float]]:
+    """A range of each parameter, or, half of the times, a known value."""
     found = {}
-    for p in family.parameters:
-        geometric = p.name in SPANS
-        low, high = np.log(SPANS[p.name]) if geometric else (p.low, p.high)
-        half = 0.0 if random.random() < points else random.uniform(0, 0.1 if geometric else 0.3)
-        middle = random.uniform(low, high)
-        ends = [max(low, middle - half * (high - low)), min(high, middle + half * (high - low))]
-        if geometric:  # rounding may lead out of the domain
-            ends = [min(max(float(np.exp(e)), p.low), p.high) for e in ends]
-        found[p.name] = (float(ends[0]), float(ends[1]))
+    for p in parameters:
+        half = 0.0 if random.random() < 0.5 else random.uniform(0, 0.3)
+        middle = random.uniform(p.low, p.high)
+        ends = (middle - half * (p.high - p.low), middle + half * (p.high - p.low))
+        found[p.name] = (max(p.low, ends[0]), min(p.high, ends[1]))
     return found
 
 

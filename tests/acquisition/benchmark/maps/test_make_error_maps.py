@@ -5,23 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from acquisition.benchmark.maps.make_error_maps import error_maps, lobe_maps
-from analysis.models.error_maps import ABSOLUTE, RELATIVE, maps
+from acquisition.benchmark.maps.make_error_maps import error_maps, smooth_maps
+from analysis.models.error_maps import levels_of, maps
 
 
 @pytest.mark.slow
 def test_the_stored_maps_are_reproduced(slow: bool) -> None:
-    relative, absolute = lobe_maps()
-    made = {"lobe": RELATIVE.levels(relative), "lobe_absolute": ABSOLUTE.levels(absolute)}
+    made = {name: levels_of(errors) for name, errors in smooth_maps().items()}
     if slow:
         made = error_maps()
         assert set(made) == set(maps())
     for name, found in made.items():
-        levels, stored = found, maps()[name]
-        if name == "lobe_absolute":  # below a few ulp of 1, errors are the processor's rounding
-            floor = ABSOLUTE.levels(np.array(4 * np.finfo(float).eps))
-            levels, stored = np.maximum(found, floor), np.maximum(stored, floor)
         # Rounding may move a value to the next level.
-        off = np.abs(levels.astype(int) - stored.astype(int))
+        off = np.abs(found.astype(int) - maps()[name].astype(int))
         assert off.max() <= 1, name
         assert np.mean(off) < 1e-3, name
