@@ -51,3 +51,13 @@ class NotDetermined(GonioError):
     """Data that do not determine the requested parameters, or are too few for any fit."""
 
     exit_code = 5
+
+
+class NoMeasurement(NotDetermined):
+    """No point to fit: nothing has been measured yet, or nothing of it is asked for."""
+
+
+class AllFlagged(NoMeasurement):
+    """Scan of which every point is flagged: the rig, the lamp or an interlock spoilt it."""
+
+    exit_code = 3

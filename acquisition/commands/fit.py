@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,16 +10,17 @@ import numpy as np
 from rich import box
 from rich.table import Table
 
+from acquisition.commands.fit_status import no_fit_reported, print_json, require_result
 from acquisition.results.model_check import check_model
 from acquisition.results.sources import Source, Wanted, read_source
 from acquisition.results.summary import VERDICTS, parameters_of, validity_note, value_text
 from acquisition.terminal.console import out
 from analysis.choice.choice import Choice, choose
-from analysis.choice.fit_json import no_fit_json, to_json
+from analysis.choice.fit_json import to_json
 from analysis.choice.ladder import METHODS, MethodOfFit
 from analysis.data.text_file import parse_number
 from analysis.fit.fit import FitResult
-from instrument.errors import InputError, NotDetermined
+from instrument.errors import InputError
 from instrument.text.quoting import printable
 
 
@@ -32,26 +31,21 @@ def fit_source(
 
     `models`: names separated by commas; None for those of a run's protocol, else the ladder.
     `method`: for rough surfaces, one of `analysis.choice.ladder.METHODS`; auto: that of a run's
-    protocol. Raises `InputError` for a wrong source or option, and
-    `NotDetermined`, after printing, where the data do not determine the parameters of the chosen
-    model or are too few for any fit.
+    protocol. Raises `InputError` for a wrong source or option; after printing, as
+    `fit_status.require_result` does.
     """
     names, way = _names(models), _method(method, models)
-    try:
+    with no_fit_reported(path, as_json):
         source = read_source(path, wanted)
         if names is None and way == "auto":
             names, way = source.fit.models, source.fit.method
         choice = choose(source.measurements, source.acceptance, names, robust, way)
-    except NotDetermined as error:
-        if as_json:
-            _print_json(no_fit_json(str(error)))
-        raise
+    found = to_json(choice)
     if as_json:
-        _print_json(_with_notes(to_json(choice), source))
+        print_json(_with_notes(found, source))
     else:
         _print(source, choice)
-    if choice.verdict == "not identifiable":
-        raise NotDetermined(f"{path}: {choice.reason}")
+    require_result(found, str(path))
 
 
 def _names(models: str | None) -> list[str] | None:
@@ -92,10 +86,6 @@ def parse_u_shared(text: str | None) -> float | None:
     if not 0 < u < 0.5:
         raise InputError(f"--u-shared: {printable(text)}; {allowed}")
     return u
-
-
-def _print_json(fit: dict[str, object]) -> None:
-    sys.stdout.write(json.dumps(fit, allow_nan=False) + "\n")
 
 
 def _with_notes(fit: dict[str, Any], source: Source) -> dict[str, Any]:

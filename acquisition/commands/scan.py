@@ -8,6 +8,7 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
+from acquisition.commands.fit_status import no_fit_reported, print_json, require_result
 from acquisition.commands.scan_session import scan
 from acquisition.commands.views import print_outcome, print_plan
 from acquisition.engine.frame_files import require_disk_space
@@ -98,11 +99,15 @@ def _plan_json(plan: Plan) -> dict[str, object]:
 
 
 def _finish(record: Record, loaded: Loaded, as_json: bool) -> None:
-    """Fit, report and print the outcome. The scan is over: a Ctrl-C costs no reading."""
+    """Fit, report and print the outcome. The scan is over: a Ctrl-C costs no reading.
+
+    Raises, after all files are written, as `fit_status.require_result` does.
+    """
     try:
         from acquisition.results.finish import finish  # heavy: only after a scan
 
-        outcome = finish(record, loaded)
+        with no_fit_reported(record.folder, as_json):
+            outcome = finish(record, loaded)
     except KeyboardInterrupt:
         raise OperatorStop(
             f"stopped by the operator before the report was written. Nothing measured is lost: "
@@ -110,9 +115,10 @@ def _finish(record: Record, loaded: Loaded, as_json: bool) -> None:
             f"with: gonio report {record.folder}"
         ) from None
     if as_json:
-        sys.stdout.write(json.dumps(outcome.fit, allow_nan=False) + "\n")
+        print_json(outcome.fit)
     else:
         print_outcome(outcome)
+    require_result(outcome.fit, f"{record.folder}: {outcome.state}")
 
 
 def _confirm(yes: bool, steps: int, record: Record) -> None:

@@ -12,20 +12,23 @@ from acquisition.results.fitting import fit_run
 from acquisition.results.measurements_csv import measurements_csv
 from acquisition.results.reduction import reduced_run
 from acquisition.results.report_inputs import report_data
-from acquisition.results.summary import budget, headline, notes, parameters_of
-from analysis.choice.fit_json import no_fit_json, to_json
+from acquisition.results.summary import budget, headline, notes, parameters_of, scan_state
 from analysis.report.data import Parameter
 from analysis.report.page import write_report
 from instrument.config.load import Loaded
-from instrument.errors import NotDetermined, StorageError
+from instrument.errors import NoMeasurement, StorageError
 from instrument.record.record import Record
 from instrument.text.atomic_file import write_whole
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Results to print; `fit` is the content of fit.json."""
+    """Results to print; `fit` is the content of fit.json.
 
+    state: the scan is complete, or what is missing of it.
+    """
+
+    state: str
     headline: str
     parameters: tuple[Parameter, ...]
     notes: tuple[str, ...]
@@ -36,20 +39,19 @@ class Outcome:
 def finish(record: Record, loaded: Loaded) -> Outcome:
     """Reduce, fit and report; each file in the run's folder is written completely or not at all.
 
-    Raises `NotDetermined` where nothing was measured, `StorageError` where the disk fails.
+    Raises `NoMeasurement` where nothing was measured, `StorageError` where the disk fails.
     """
     reduced = reduced_run(record, loaded)
     if not reduced.points:
-        raise NotDetermined(
-            f"{record.folder}: no geometry has been measured yet: gonio resume {record.folder}"
-        )
+        raise NoMeasurement(f"no geometry has been measured yet: {scan_state(record)}")
     fitted = fit_run(reduced, loaded)
     u_brdf = fitted.u_brdf(reduced)
     outcome = Outcome(
+        scan_state(record),
         headline(fitted),
         () if fitted.chosen is None else parameters_of(fitted.chosen),
         notes(reduced, fitted, record, loaded),
-        no_fit_json(fitted.reason) if fitted.choice is None else to_json(fitted.choice),
+        fitted.as_json(),
         record.folder / "report.html",
     )
     with _recovery_named(record.folder):

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from acquisition.results.reduction import Reduced, root_sum_square
+from acquisition.results.reduction import Reduced, require_usable, root_sum_square
 from analysis.choice.choice import Choice, choose
+from analysis.choice.fit_json import no_fit_json, to_json
 from analysis.data.acceptance import Acceptance
 from analysis.data.measurements import Measurements
 from analysis.fit.fit import FitResult, stated_u
@@ -22,13 +24,14 @@ class Fitted:
     """Choice of a model for a run of N points, or None and the reason for it.
 
     used: mask (N,) of the points that were fitted. measurements: those points as the fit had them,
-    None where there is no choice.
+    None where there is no choice. failure: the error for which there is none, if a fit raised one.
     """
 
     choice: Choice | None
     used: BoolArray
     reason: str
     measurements: Measurements | None = None
+    failure: NotDetermined | None = None
 
     @property
     def chosen(self) -> FitResult | None:
@@ -36,6 +39,12 @@ class Fitted:
         if self.choice is None or self.choice.chosen is None:
             return None
         return next(c for c in self.choice.candidates if c.model == self.choice.chosen)
+
+    def as_json(self) -> dict[str, Any]:
+        """Content of fit.json."""
+        if self.choice is not None:
+            return to_json(self.choice)
+        return no_fit_json(self.failure or NotDetermined(self.reason))
 
     def u_brdf(self, reduced: Reduced) -> FloatArray:
         """Standard uncertainty of every BRDF, (N,) in 1/sr.
@@ -53,9 +62,12 @@ def fit_run(reduced: Reduced, loaded: Loaded) -> Fitted:
     acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
     asked = loaded.protocol.fit
     try:
+        require_usable(reduced)
         fitted = measurements(reduced, loaded)
         choice = choose(fitted, acceptance, asked.models, method=asked.method)
-    except (NotDetermined, ValueError) as error:  # too few points, or none that shows light
+    except NotDetermined as error:
+        return Fitted(None, reduced.valid, str(error), failure=error)
+    except ValueError as error:  # values outside their domain, such as a u of 0
         return Fitted(None, reduced.valid, str(error))
     return Fitted(choice, reduced.valid, choice.reason, fitted)
 

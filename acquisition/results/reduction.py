@@ -17,6 +17,7 @@ from acquisition.measure.drift import Drift, rate
 from analysis.data.measurements import SharedError
 from instrument.config.load import Loaded
 from instrument.config.protocol import Protocol
+from instrument.errors import AllFlagged, NoMeasurement, NotDetermined
 from instrument.geometry import BoolArray, FloatArray
 from instrument.record.reading import Check, Reading
 from instrument.record.record import Record
@@ -98,6 +99,25 @@ def reduced_run(record: Record, loaded: Loaded) -> Reduced:
     return reduce(record.readings(), loaded.protocol, record.checks())
 
 
+def require_usable(reduced: Reduced) -> None:
+    """Raise where no point can be fitted.
+
+    `NoMeasurement` if there is none yet, `NotDetermined` if the white tile is still to come, and
+    `AllFlagged` if something is wrong with every point.
+    """
+    if np.any(reduced.valid):
+        return
+    if not reduced.points:
+        raise NoMeasurement("no geometry has been measured yet: resume the scan")
+    if NO_TILE_YET in reduced.flags:
+        raise NotDetermined("no white tile has been read yet: resume the scan")
+    kinds = ", ".join(sorted({kind for flags in reduced.flags for kind in flags.split("; ")}))
+    raise AllFlagged(
+        f"no measurement: all {len(reduced.points)} points are flagged ({kinds}); correct the "
+        "cause and repeat the scan"
+    )
+
+
 def reduce(readings: Sequence[Reading], protocol: Protocol, checks: Sequence[Check]) -> Reduced:
     """Return radiance and BRDF of all points; `checks`: the lamp checks made at each resume."""
     points = tuple(r for r in readings if r.kind == "point")
@@ -108,7 +128,7 @@ def reduce(readings: Sequence[Reading], protocol: Protocol, checks: Sequence[Che
     tile = protocol.references.white_tile
     known = tile.reflectance / np.pi if tile is not None else np.nan
     own = [tiles.get(p.lamp_setting) for p in points]
-    white = np.array([np.nan if t is None else t.rate for t in own])
+    white = np.array([np.nan if t is None else t.rate or np.nan for t in own])
     return Reduced(
         points=points,
         radiance=radiance,
@@ -135,7 +155,7 @@ def _tile(reading: Reading, drift: Drift) -> _Tile:
     return _Tile(
         rate(reading) / drift.at(reading.time_s),
         float(np.linalg.norm([*counts, drift.u_extrapolated(reading.time_s)])),
-        reading.flags,
+        "; ".join(f for f in (reading.flags, NO_SIGNAL if reading.signal_dn == 0 else "") if f),
     )
 
 

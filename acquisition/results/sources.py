@@ -9,17 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 from acquisition.results.fitting import measurements
-from acquisition.results.reduction import reduced_run
+from acquisition.results.reduction import reduced_run, require_usable
 from acquisition.results.run_folder import load_run_inputs
 from analysis.data.acceptance import Acceptance
 from analysis.data.csv_table import read_table
 from analysis.data.curet import read_curet
 from analysis.data.measurements import Measurements, SharedError
 from instrument.config.protocol import FitConfig
-from instrument.errors import InputError, NotDetermined
+from instrument.errors import InputError, NoMeasurement, NotDetermined
 from instrument.record.record import FILE_NAME, Record
 
-_MIN_MEAN = 1e-15  # of relative values: less is no light at all
 FORMATS = ("auto", "run", "csv", "curet")
 
 
@@ -60,7 +59,11 @@ class Wanted:
 
 
 def read_source(path: Path, wanted: Wanted) -> Source:
-    """Read a source. Raises `InputError` for wrong input, `NotDetermined` if no point is left."""
+    """Read a source.
+
+    Raises `InputError` for wrong input, `NoMeasurement` if no point is left, `AllFlagged` if those
+    of a run are all flagged, `NotDetermined` if its values are outside their domain.
+    """
     _check(wanted)
     kind = _kind(path) if wanted.format == "auto" else wanted.format
     if (wanted.sample is not None) != (kind == "curet"):
@@ -79,9 +82,9 @@ def read_source(path: Path, wanted: Wanted) -> Source:
         source = _run(path) if kind == "run" else _csv(path, wanted)
         source = _cut(source, wanted.max_theta_deg)
     if wanted.relative:
-        source = replace(source, measurements=_as_relative(path, source.measurements))
+        source = replace(source, measurements=replace(source.measurements, relative=True))
     if source.measurements.size == 0:
-        raise NotDetermined(f"{path}: no point is left to fit")
+        raise NoMeasurement("no point is left to fit")
     return source
 
 
@@ -109,14 +112,13 @@ def _run(path: Path) -> Source:
     with Record.open(path) as record:
         loaded = load_run_inputs(record)
         reduced = reduced_run(record, loaded)
-    if not np.any(reduced.valid):
-        raise NotDetermined(f"{path}: no geometry has been measured yet that could be fitted")
+    require_usable(reduced)
     notes = _flagged(int(np.sum(~reduced.valid)), reduced.valid.size)
     acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
     try:
         found = measurements(reduced, loaded)
     except ValueError as error:  # values outside their domain, such as a u of 0
-        raise NotDetermined(f"{path}: {error}") from None
+        raise NotDetermined(str(error)) from None
     return Source(found, acceptance, notes, loaded.protocol.fit)
 
 
@@ -174,12 +176,3 @@ def _cut(source: Source, max_theta_deg: float) -> Source:
     text = f"{int(np.sum(~inside))} of {m.size} points lie beyond {max_theta_deg:g} degrees"
     notes = (*source.notes, Note("cut", text))
     return replace(source, measurements=m.subset(inside), notes=notes)
-
-
-def _as_relative(path: Path, m: Measurements) -> Measurements:
-    if m.size and not np.mean(m.brdf) > _MIN_MEAN:
-        raise InputError(
-            f"{path}: brdf: mean {np.mean(m.brdf):g}; allowed for relative values: more than "
-            f"{_MIN_MEAN:g}"
-        )
-    return replace(m, relative=True)

@@ -118,6 +118,11 @@ def _flag_note(reduced: Reduced) -> str:
     return f"{len(flagged)} of {len(reduced.flags)} points are flagged and not fitted: {kinds}"
 
 
+def scan_state(record: Record) -> str:
+    """Return that the scan is complete, recorded and reported, or what is missing of it."""
+    return _unfinished_note(record) or "the run is complete: all readings are recorded and reported"
+
+
 def _unfinished_note(record: Record) -> str:
     planned, made = int(record.meta("steps") or 0), len(record.readings())
     if made >= planned:

@@ -15,6 +15,7 @@ import numpy as np
 from analysis.choice.candidates import Candidates
 from analysis.choice.cross_validation import folds, held_out_error
 from analysis.choice.ladder import LADDER, RICH, SAME_PREDICTION, MethodOfFit, physics, with_method
+from analysis.choice.light import require_light
 from analysis.choice.runs_test import runs_probability, worst_stretches
 from analysis.choice.symmetry_test import Symmetry, p_text, symmetry
 from analysis.data.acceptance import Acceptance
@@ -62,9 +63,10 @@ def choose(
     Without `models`, the candidates are LADDER and, where these do not explain the data, also RICH;
     an integrated model whose functional form is as accurate is then left out, unless a `method` for
     the rough surface is requested. Models with too many parameters for the points are left out.
-    Raises `NotDetermined` when the points are too few for all of them, `KeyError` for an unknown
-    model.
+    Raises `NotDetermined` when the points are too few for all of them or show no light, `KeyError`
+    for an unknown model.
     """
+    require_light(measurements)
     names = with_method(models or LADDER, method)
     candidates = Candidates.of(names, measurements, robust, every=models is not None)
     choice = _chosen(candidates, acceptance)

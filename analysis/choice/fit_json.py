@@ -8,6 +8,7 @@ from typing import Any
 from analysis.choice.choice import Choice
 from analysis.choice.symmetry_test import Symmetry
 from analysis.fit.fit import FitResult
+from instrument.errors import NoMeasurement, NotDetermined
 
 
 def to_json(choice: Choice) -> dict[str, Any]:
@@ -21,9 +22,10 @@ def to_json(choice: Choice) -> dict[str, Any]:
     }
 
 
-def no_fit_json(reason: str) -> dict[str, Any]:
-    """Content where no model could be fitted, with the reason."""
-    return to_json(Choice((), None, "not identifiable", reason))
+def no_fit_json(error: NotDetermined) -> dict[str, Any]:
+    """Content where no model could be fitted; without a measurement there is no verdict."""
+    found = to_json(Choice((), None, "not identifiable", str(error)))
+    return {**found, "verdict": None} if isinstance(error, NoMeasurement) else found
 
 
 def _candidate(result: FitResult) -> dict[str, Any]:

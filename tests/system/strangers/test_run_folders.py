@@ -9,7 +9,7 @@ import pytest
 
 from acquisition.commands.scan import report_run, resume_run
 from acquisition.results.sources import Wanted, read_source
-from instrument.errors import GonioError, InputError
+from instrument.errors import GonioError, InputError, NotDetermined
 from instrument.record.record import FILE_NAME
 from tests.support.command import gonio
 from tests.support.strangers.run_folders import REFUSED, SCRIPT, Sent, copy_of, run_few_points
@@ -116,5 +116,6 @@ def test_impossible_but_well_formed_values_give_a_result_or_a_named_error(
 
 def test_a_report_of_impossible_values_says_that_nothing_was_fitted(sent: Sent) -> None:
     sent.sql("UPDATE reading SET u_noise_dn = 0.0, u_quantisation_dn = 0.0, u_texture_dn = 0.0")
-    report_run(sent.folder, as_json=True)
+    with pytest.raises(NotDetermined, match=r"the run is complete: .* u_random = 0 1/sr"):
+        report_run(sent.folder, as_json=True)
     assert "No model was fitted" in (sent.folder / "report.html").read_text()
