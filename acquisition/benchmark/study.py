@@ -50,11 +50,3 @@ class Study:
     def in_scene(self, scene: str) -> list[Trial]:
         """Return the trials of one scene."""
         return select(self.trials, scene=scene)
-
-    def trial(self, scene: str, label: str) -> Trial:
-        """Return one trial. Raises `KeyError` that lists the labels of the scene."""
-        own = self.in_scene(scene)
-        for trial in select(own, label=label):
-            return trial
-        known = ", ".join(trial.label for trial in own)
-        raise KeyError(f"{self.name}: no {label!r} in {scene!r}; there are: {known or 'none'}")

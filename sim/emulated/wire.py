@@ -1,4 +1,4 @@
-"""Pseudo-terminal or TCP port of an emulated controller, with faults injected into its answers.
+"""Serial port of an emulated controller, with faults injected into its answers.
 
 A controller is a function from received bytes to answered bytes. A wire carries both in a thread of
 its own and applies the faults that a test has injected.
@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import os
 import select
-import socket
 import threading
 import time
 import tty
@@ -45,7 +44,7 @@ class Fault:
     seconds: float = 0.0
 
 
-class _Wire(Closeable):
+class Wire(Closeable):
     """Passes bytes to the controllers and their answers back; subclasses implement the port.
 
     `seen`: time (monotonic, in s) and bytes of each message received from the master.
@@ -123,7 +122,7 @@ _CORRUPT: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
-class PtyWire(_Wire):
+class PtyWire(Wire):
     """Serial port on a pseudo-terminal; the master opens `port`."""
 
     def __init__(self, controllers: Sequence[Controller]) -> None:
@@ -151,37 +150,3 @@ class PtyWire(_Wire):
                 if descriptor >= 0:
                     os.close(descriptor)
             self._master = self._slave = -1
-
-
-class TcpWire(_Wire):
-    """TCP port of a gateway; the master connects to `host` and `port`."""
-
-    host = "127.0.0.1"
-
-    def __init__(self, controllers: Sequence[Controller]) -> None:
-        self._listener = socket.create_server((self.host, 0))
-        self.port: int = self._listener.getsockname()[1]
-        self._peer: socket.socket | None = None
-        super().__init__(controllers)
-
-    def _serve(self) -> None:
-        while not self._closing.is_set():
-            try:
-                self._peer, _ = self._listener.accept()
-                with self._peer as peer:  # closed before the next connection is accepted
-                    while data := peer.recv(4096):
-                        self._receive(data)
-            except OSError:
-                continue  # unplugged, or the master has disconnected
-
-    def _send(self, data: bytes) -> None:
-        if self._peer is not None:
-            with contextlib.suppress(OSError):  # the master has disconnected
-                self._peer.sendall(data)
-
-    def _unplug(self) -> None:
-        for end in (self._peer, self._listener):
-            if end is not None:
-                with contextlib.suppress(OSError):  # not connected
-                    end.shutdown(socket.SHUT_RDWR)
-                end.close()

@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from instrument.config.axes import AXES, SimulatedAxis
 from instrument.devices import Camera, Lamp, Operator, Stage
@@ -36,7 +36,7 @@ FAULTS: Mapping[str, tuple[str, ...]] = {
 }
 _FAULT = re.compile(r"(\w+) (.+) (at|after) (\w+\.\w+) ([1-9]\d*)")
 
-D = TypeVar("D", bound=FaultyDevice)
+D = TypeVar("D", bound=FaultyDevice[Any])
 
 
 class Faults:
@@ -48,7 +48,7 @@ class Faults:
     def __init__(self, text: str = "") -> None:
         self.triggers = Triggers()
         self.scene: Scene | None = None
-        self._devices: dict[str, FaultyDevice] = {}
+        self._devices: dict[str, FaultyDevice[Any]] = {}
         for part in filter(None, map(str.strip, text.split(";"))):
             self._plan_text(part)
 
@@ -74,15 +74,15 @@ class Faults:
 
     def camera(self, camera: Camera) -> Camera:
         """Wrap the camera."""
-        return self._register("camera", FaultyCamera(camera, self.triggers))
+        return self._register("camera", FaultyCamera("camera", camera, self.triggers))
 
     def lamp(self, lamp: Lamp) -> Lamp:
         """Wrap the lamp's shutter."""
-        return self._register("lamp", FaultyLamp(lamp, self.triggers))
+        return self._register("lamp", FaultyLamp("lamp", lamp, self.triggers))
 
     def operator(self, operator: Operator) -> Operator:
         """Wrap the operator."""
-        return self._register("operator", FaultyOperator(operator, self.triggers))
+        return self._register("operator", FaultyOperator("operator", operator, self.triggers))
 
     def _register(self, name: str, device: D) -> D:
         self._devices[name] = device

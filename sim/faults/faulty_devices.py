@@ -11,7 +11,7 @@ import logging
 from collections import Counter
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import ClassVar
+from typing import ClassVar, Generic, TypeVar
 
 from instrument.config.axes import SimulatedAxis
 from instrument.devices import Camera, Frame, Lamp, Operator, Request, Stage
@@ -21,18 +21,20 @@ from sim.scene.scene import Scene
 
 log = logging.getLogger(__name__)
 
+D = TypeVar("D")
+
 _OFFSET_DEG = 0.3  # of a stage that slips or stops short: many times any rig file's tolerance
 _MOST_TORN = 3  # consecutive bad frames tolerated, as by the V4L2 driver
 _CABLE = "check the USB cable, the camera and any hub in between"
 
 
-class FaultyDevice:
-    """Base class: the faults that a device can have, and those it has now."""
+class FaultyDevice(Generic[D]):
+    """Wrapper of one device: the faults that it can have, and those it has now."""
 
     faults: ClassVar[tuple[str, ...]]
 
-    def __init__(self, name: str, triggers: Triggers) -> None:
-        self._name, self._triggers = name, triggers
+    def __init__(self, name: str, device: D, triggers: Triggers) -> None:
+        self._name, self._device, self._triggers = name, device, triggers
         self._active: Counter[str] = Counter()
 
     def fail(self, fault: str) -> None:
@@ -47,7 +49,7 @@ class FaultyDevice:
         """Raise if the device cannot answer at all."""
 
 
-class FaultyStage(FaultyDevice):
+class FaultyStage(FaultyDevice[Stage]):
     """Stage of one motorised axis."""
 
     faults = (
@@ -58,8 +60,8 @@ class FaultyStage(FaultyDevice):
     def __init__(
         self, name: str, stage: Stage, axis: SimulatedAxis, scene: Scene, triggers: Triggers
     ) -> None:
-        super().__init__(name, triggers)
-        self._stage, self._axis, self._scene = stage, axis, scene
+        super().__init__(name, stage, triggers)
+        self._axis, self._scene = axis, scene
         self._offset_deg = 0.0
 
     def fail(self, fault: str) -> None:
@@ -72,38 +74,38 @@ class FaultyStage(FaultyDevice):
     def identity(self) -> str:
         """Return the wrapped stage's description."""
         with self._call("identity"):
-            return self._stage.identity()
+            return self._device.identity()
 
     def home(self) -> None:
         """Find the reference."""
         with self._call("home"):
             self._require_free("its reference was not found")
-            self._stage.home()
+            self._device.home()
             self._active.pop("loses its reference", None)
             self._offset_deg = 0.0
 
     def homed(self) -> bool:
         """Return True if the reference is known."""
         with self._call("homed"):
-            return "loses its reference" not in self._active and self._stage.homed()
+            return "loses its reference" not in self._active and self._device.homed()
 
     def settings(self) -> dict[str, str]:
         """Return the wrapped stage's settings."""
         with self._call("settings"):
-            return self._stage.settings()
+            return self._device.settings()
 
     def start_move(self, angle_deg: float) -> None:
         """Start a move."""
         with self._call("start_move"):
             self._require_reference()
-            self._stage.start_move(angle_deg)
+            self._device.start_move(angle_deg)
 
     def wait(self) -> float:
         """Let the move finish and return the position in degrees."""
         with self._call("wait"):
             self._require_free("stalled")
             self._require_reference()
-            reached_deg = self._stage.wait()
+            reached_deg = self._device.wait()
             self._offset_deg = -_OFFSET_DEG if self._active.pop("stops short", 0) else 0.0
             self._write_scene()
             return reached_deg + self._offset_deg
@@ -112,17 +114,17 @@ class FaultyStage(FaultyDevice):
         """Return the current position."""
         with self._call("position_deg"):
             self._require_reference()
-            return self._stage.position_deg() + self._offset_deg
+            return self._device.position_deg() + self._offset_deg
 
     def limits_deg(self) -> tuple[float, float]:
         """Return the rig file's limits."""
         with self._call("limits_deg"):
-            return self._stage.limits_deg()
+            return self._device.limits_deg()
 
     def stop(self) -> None:
         """End the move at the current position."""
         with self._call("stop"):
-            self._stage.stop()
+            self._device.stop()
             self._write_scene()
 
     def close(self) -> None:
@@ -136,8 +138,8 @@ class FaultyStage(FaultyDevice):
         """Stop and raise if the axis is blocked or at its limit switch."""
         if not self._active.keys() & {"stalls", "meets its limit switch"}:
             return
-        self._stage.stop()
-        at_deg = self._stage.position_deg()
+        self._device.stop()
+        at_deg = self._device.position_deg()
         if "meets its limit switch" in self._active:
             raise DeviceError(
                 f"{self._name}: limit switch met at {at_deg:g} deg: find out why the stage ran "
@@ -156,20 +158,16 @@ class FaultyStage(FaultyDevice):
 
     def _write_scene(self) -> None:
         if self._offset_deg:
-            device_deg = self._stage.position_deg() + self._offset_deg
+            device_deg = self._device.position_deg() + self._offset_deg
             self._scene.set_axis(self._name, self._axis.from_device_deg(device_deg))
 
 
-class FaultyCamera(FaultyDevice):
+class FaultyCamera(FaultyDevice[Camera]):
     """Camera on a cable; reopening it and retaking torn frames take no simulated time."""
 
     faults = (
         "gives no frame", "gives a torn frame", "gives torn frames", "is unplugged", "comes back",
     )  # fmt: skip
-
-    def __init__(self, camera: Camera, triggers: Triggers) -> None:
-        super().__init__("camera", triggers)
-        self._camera = camera
 
     def fail(self, fault: str) -> None:
         """Begin a fault; "comes back" ends an unplugging."""
@@ -181,17 +179,17 @@ class FaultyCamera(FaultyDevice):
     def identity(self) -> str:
         """Return the wrapped camera's description."""
         with self._call("identity"):
-            return self._camera.identity()
+            return self._device.identity()
 
     def settings(self) -> dict[str, str]:
         """Return the wrapped camera's settings."""
         with self._call("settings"):
-            return self._camera.settings()
+            return self._device.settings()
 
     def set_exposure_s(self, exposure_s: float) -> float:
         """Set the exposure in seconds."""
         with self._call("set_exposure_s"):
-            return self._camera.set_exposure_s(exposure_s)
+            return self._device.set_exposure_s(exposure_s)
 
     def grab(self, count: int) -> list[Frame]:
         """Take `count` frames, retaking torn ones."""
@@ -199,7 +197,7 @@ class FaultyCamera(FaultyDevice):
             if self._active.pop("gives no frame", 0):  # the next attempt reopens the camera
                 raise CameraLost(f"camera: no frame for 1 s: the stream has stopped; {_CABLE}")
             self._discard_torn()
-            return self._camera.grab(count)
+            return self._device.grab(count)
 
     def close(self) -> None:
         """Do nothing: there is nothing to release."""
@@ -223,29 +221,25 @@ class FaultyCamera(FaultyDevice):
         return "gives torn frames" in self._active
 
 
-class FaultyLamp(FaultyDevice):
+class FaultyLamp(FaultyDevice[Lamp]):
     """Lamp with a shutter."""
 
     faults = ("sticks",)
 
-    def __init__(self, lamp: Lamp, triggers: Triggers) -> None:
-        super().__init__("lamp", triggers)
-        self._lamp = lamp
-
     def identity(self) -> str:
         """Return the wrapped lamp's description."""
         with self._call("identity"):
-            return self._lamp.identity()
+            return self._device.identity()
 
     def darken(self) -> None:
         """Close the shutter."""
         with self._call("darken"):
-            self._move(self._lamp.darken, "close")
+            self._move(self._device.darken, "close")
 
     def light(self) -> None:
         """Open the shutter."""
         with self._call("light"):
-            self._move(self._lamp.light, "open")
+            self._move(self._device.light, "open")
 
     def _move(self, action: Callable[[], None], verb: str) -> None:
         if "sticks" in self._active:
@@ -256,14 +250,10 @@ class FaultyLamp(FaultyDevice):
         action()
 
 
-class FaultyOperator(FaultyDevice):
+class FaultyOperator(FaultyDevice[Operator]):
     """Operator who can refuse a request (answer q) or leave (close the terminal)."""
 
     faults = ("refuses", "leaves")
-
-    def __init__(self, operator: Operator, triggers: Triggers) -> None:
-        super().__init__("operator", triggers)
-        self._operator = operator
 
     def ask(self, request: Request) -> str:
         """Return the operator's answer; raise `OperatorStop` if there is none."""
@@ -272,4 +262,4 @@ class FaultyOperator(FaultyDevice):
                 raise OperatorStop(f"stopped at the prompt: {request.text}")
             if "leaves" in self._active:
                 raise OperatorStop("standard input ended: nobody answers")
-            return self._operator.ask(request)
+            return self._device.ask(request)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import math
+from typing import Any
 
 from acquisition.benchmark.effort import Effort
 from acquisition.benchmark.output.charts import MAIN
 from acquisition.benchmark.result import BenchmarkResult
 from acquisition.benchmark.study import Study
-from acquisition.benchmark.trial import Trial
+from acquisition.benchmark.trial import Trial, select
 
 FEW = Effort(
     name="test", truths=2, batch=512, repeats=3, frame_views=3, starts=4, data_sets=1, seeds=2,
@@ -60,6 +62,28 @@ def result() -> BenchmarkResult:
     )
 
 
+def trial_of(study: Study, scene: str, label: str) -> Trial:
+    """The trial of a method in a scene."""
+    (found,) = select(study.in_scene(scene), label=label)
+    return found
+
+
 def worst(study: Study, label: str) -> float:
     """The largest error of a method over all scenes."""
-    return max(study.trial(scene, label).error for scene in study.scenes)
+    return max(trial_of(study, scene, label).error for scene in study.scenes)
+
+
+def from_json(text: str) -> BenchmarkResult:
+    """The result in a bench.json, without maps."""
+    whole: dict[str, Any] = json.loads(text)
+    studies = tuple(
+        Study(**{**study, "trials": tuple(map(_trial, study["trials"]))})
+        for study in whole["studies"]
+    )
+    others = {name: whole[name] for name in ("effort", "seconds", "machine")}
+    return BenchmarkResult(**others, peers=tuple(whole["peers"]), studies=studies)
+
+
+def _trial(plain: dict[str, Any]) -> Trial:
+    errors = {n: math.inf if plain[n] is None else plain[n] for n in ("error", "error_median")}
+    return Trial(**{**plain, **errors})

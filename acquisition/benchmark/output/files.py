@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
 
 from acquisition.benchmark.output.charts import main_chart, standalone
 from acquisition.benchmark.output.page import page
@@ -65,28 +64,10 @@ def to_json(result: BenchmarkResult) -> str:
     return json.dumps(whole, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def from_json(text: str) -> BenchmarkResult:
-    """Return a result from its JSON, without maps. Raises `InputError` for another schema."""
-    whole: dict[str, Any] = json.loads(text)
-    if whole.get("schema") != SCHEMA:
-        raise InputError(f"bench.json: schema {whole.get('schema')}; allowed: {SCHEMA}")
-    studies = tuple(
-        Study(**{**study, "trials": tuple(map(_trial, study["trials"]))})
-        for study in whole["studies"]
-    )
-    others = {name: whole[name] for name in ("effort", "seconds", "machine")}
-    return BenchmarkResult(**others, peers=tuple(whole["peers"]), studies=studies)
-
-
 def _plain(trial: Trial) -> dict[str, object]:
     found = {name: getattr(trial, name) for name in _COLUMNS}
     finite = {name: found[name] if math.isfinite(found[name]) else None for name in _ERRORS}
     return {**found, **finite, "more": dict(trial.more)}
-
-
-def _trial(plain: dict[str, Any]) -> Trial:
-    errors = {name: math.inf if plain[name] is None else plain[name] for name in _ERRORS}
-    return Trial(**{**plain, **errors})
 
 
 def table(study: Study) -> str:

@@ -9,9 +9,8 @@ from xml.etree import ElementTree
 import pytest
 
 from acquisition.benchmark.command import run_benchmark
-from acquisition.benchmark.output.files import from_json
 from acquisition.benchmark.result import MapPicture
-from tests.support.benchmark import result
+from tests.support.benchmark import from_json, result
 from tests.support.command import gonio
 
 

@@ -15,5 +15,3 @@ def test_a_study_has_its_own_trials_each_once() -> None:
         replace(own, trials=(*own.trials, own.trials[0]))
     with pytest.raises(ValueError, match="a trial of the study 's'"):
         replace(own, name="t")
-    with pytest.raises(KeyError, match="no 'dear' in 'calm'; there are: cheap, usual"):
-        own.trial("calm", "dear")

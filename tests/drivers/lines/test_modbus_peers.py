@@ -36,11 +36,11 @@ from drivers.stages.oriental_framing import (
 )
 from instrument.clock import SystemClock
 from instrument.errors import DeviceError
-from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway
 from sim.emulated.motor import Motor
 from sim.emulated.oriental_controller import OrientalController
-from sim.emulated.wire import PtyWire, TcpWire
+from sim.emulated.wire import PtyWire
 from tests.support.stages.emulated_az_drive import FAST, az_settings
+from tests.support.stages.modbus_tcp_gateway import ModbusTcpGateway, TcpWire
 
 pytestmark = pytest.mark.waits
 

@@ -18,10 +18,9 @@ from drivers.stages.motor_stage import Stopped
 from drivers.stages.oriental import OrientalSettings, OrientalStage
 from instrument.clock import SystemClock
 from instrument.errors import DeviceError, InputError
-from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway
 from sim.emulated.motor import Motor
 from sim.emulated.oriental_controller import OrientalController, crc
-from sim.emulated.wire import Fault, PtyWire, TcpWire
+from sim.emulated.wire import Fault, PtyWire
 from tests.support.stages.emulated_az_drive import (
     FAST,
     LIMITS,
@@ -33,6 +32,7 @@ from tests.support.stages.emulated_az_drive import (
     az_settings,
     emulated_drive,
 )
+from tests.support.stages.modbus_tcp_gateway import ModbusTcpGateway, TcpWire
 from tests.support.stages.waiting import wait_until
 
 pytestmark = pytest.mark.waits

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from instrument.clock import SystemClock
-from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.oriental_controller import OrientalController, crc
 from tests.support.stages.emulated_az_drive import FAST, MAKERS_EXAMPLE
+from tests.support.stages.modbus_tcp_gateway import ModbusTcpGateway
 
 
 def test_the_emulated_drive_takes_the_makers_example() -> None:

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field, replace
 from drivers.stages.motion import Limits
 from drivers.stages.oriental import OrientalSettings, OrientalStage
 from instrument.clock import SystemClock
-from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.oriental_controller import OrientalController
-from sim.emulated.wire import PtyWire, TcpWire
+from sim.emulated.wire import PtyWire
 from tests.support.stages.emulated_stages import port_of
+from tests.support.stages.modbus_tcp_gateway import ModbusTcpGateway, TcpWire
 
 STEPS_PER_DEG = 100.0
 LIMITS = Limits(

@@ -11,8 +11,9 @@ from drivers.stages.motion import Limits
 from instrument.clock import SystemClock
 from instrument.devices import Stage
 from sim.emulated.motor import Mechanics, Motor
-from sim.emulated.wire import PtyWire, TcpWire
+from sim.emulated.wire import PtyWire
 from tests.support.stages.kinds import KINDS, controller_for, open_stage
+from tests.support.stages.modbus_tcp_gateway import TcpWire
 
 # Quick mechanics: tests wait for real motion. The controller's limits are wider on one side.
 MECHANICS = Mechanics(

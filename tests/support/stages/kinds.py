@@ -12,12 +12,12 @@ from drivers.stages.newport import NewportStage
 from drivers.stages.oriental import OrientalSettings, OrientalStage
 from drivers.stages.zaber import ZaberStage
 from instrument.clock import Clock
-from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway
 from sim.emulated.motor import Motor
 from sim.emulated.newport_controller import NewportController
 from sim.emulated.oriental_controller import OrientalController
 from sim.emulated.wire import Controller
 from sim.emulated.zaber_controller import MICROSTEPS_PER_DEG, ZaberController
+from tests.support.stages.modbus_tcp_gateway import ModbusTcpGateway
 
 STEPS_PER_DEG = 1000.0
 

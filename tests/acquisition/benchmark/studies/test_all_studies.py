@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.benchmark.output.files import from_json
 from acquisition.benchmark.trial import select
+from tests.support.benchmark import from_json
 from tests.support.command import gonio
 
 

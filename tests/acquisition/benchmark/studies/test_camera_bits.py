@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from acquisition.benchmark.demo_scan import shipped_demo
 from acquisition.benchmark.studies.camera_bits import DEFAULT, SCENES, bits_study
-from tests.support.benchmark import FEW
+from tests.support.benchmark import FEW, trial_of
 
 
 def test_frames_do_not_reduce_the_rounding_error() -> None:
@@ -12,12 +12,12 @@ def test_frames_do_not_reduce_the_rounding_error() -> None:
     bright, dark, _ = study.scenes
     for scene in (bright, dark):
         for frames in (1, 64):
-            trial = study.trial(scene, f"8 bit × {frames}")
+            trial = trial_of(study, scene, f"8 bit × {frames}")
             # 20 draws: within a factor of 2 (chi-square, 20 degrees of freedom: 5 to 45).
             assert 0.5 < trial.error / trial.more["u_rounding_relative"] < 2
-    few, many = (study.trial(bright, f"12 bit × {n}").error for n in (1, 64))
+    few, many = (trial_of(study, bright, f"12 bit × {n}").error for n in (1, 64))
     assert many < few / 3
-    assert study.trial(dark, "12 bit × 4").error < study.trial(dark, "8 bit × 4").error / 10
+    assert trial_of(study, dark, "12 bit × 4").error < trial_of(study, dark, "8 bit × 4").error / 10
 
 
 def test_the_default_is_the_demonstration() -> None:

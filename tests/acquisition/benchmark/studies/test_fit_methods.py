@@ -12,7 +12,7 @@ from acquisition.benchmark.studies.fit_truth import (
     optimum,
     random_starts,
 )
-from tests.support.benchmark import FEW
+from tests.support.benchmark import FEW, trial_of
 from tests.support.cpu_time import cpu_ratio
 
 
@@ -21,11 +21,11 @@ def test_the_program_finds_every_optimum() -> None:
     for study in (near, misses):
         assert study.scenes == near.scenes
     for scene in near.scenes:
-        own = near.trial(scene, "grid, scales solved")
+        own = trial_of(near, scene, "grid, scales solved")
         assert own.failures == 0
         assert own.error < 1e-3
-        assert misses.trial(scene, own.label).error == 0
-        assert near.trial(scene, "lmfit").peer
+        assert trial_of(misses, scene, own.label).error == 0
+        assert trial_of(near, scene, "lmfit").peer
 
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.model)

@@ -22,7 +22,7 @@ from analysis.models import MODELS
 from analysis.models.rough.form_error_table import ERROR as TABLE_ERROR
 from analysis.models.rough.oren_nayar_exact import clear_profile_cache, oren_nayar_exact_brdf
 from instrument.geometry import Geometry
-from tests.support.benchmark import FEW, worst
+from tests.support.benchmark import FEW, trial_of, worst
 from tests.support.cpu_time import cpu_ratio
 
 
@@ -34,7 +34,7 @@ def test_the_rough_surface_is_as_accurate_as_specified() -> None:
         assert worst(study, f"{label}, first") <= accuracy
     assert worst(study, "table") <= TABLE_ERROR
     for scene in study.scenes:
-        typical = [study.trial(scene, n).error_median for n in ("Lambert", FUNCTIONAL)]
+        typical = [trial_of(study, scene, n).error_median for n in ("Lambert", FUNCTIONAL)]
         assert typical[1] < typical[0]
 
 
@@ -80,7 +80,8 @@ def test_physical_optics() -> None:
     study = beckmann_study(FEW)
     assert worst(study, "adaptive sum") < 1e-9
     smooth, _, rough = study.scenes
-    assert study.trial(smooth, "10 terms").error < 1e-9
+    assert trial_of(study, smooth, "10 terms").error < 1e-9
     # e^-g with g of 1000: the first hundred terms hold nothing of the sum.
-    assert study.trial(rough, "100 terms").error == pytest.approx(1.0)
-    assert study.trial(rough, "rough (79)").error < 0.01 < study.trial(smooth, "rough (79)").error
+    assert trial_of(study, rough, "100 terms").error == pytest.approx(1.0)
+    on_rough, on_smooth = (trial_of(study, scene, "rough (79)").error for scene in (rough, smooth))
+    assert on_rough < 0.01 < on_smooth

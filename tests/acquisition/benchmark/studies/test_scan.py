@@ -15,7 +15,7 @@ from acquisition.plan.plan import make_plan
 from acquisition.rig import open_devices
 from instrument.devices import Camera, Frame
 from instrument.record.record import Record
-from tests.support.benchmark import FEW
+from tests.support.benchmark import FEW, trial_of
 from tests.support.stand_ins import PassThrough
 
 
@@ -30,7 +30,7 @@ def test_errors_are_as_stated_and_above_the_photon_limit() -> None:
             if trial.bound:
                 continue
             stated = trial.more["u_stated_relative"]
-            assert stated > study.trial(scene, f"photons: {trial.label}").error
+            assert stated > trial_of(study, scene, f"photons: {trial.label}").error
             assert trial.error < 4 * stated
         minutes = {t.label: t.cost for t in study.in_scene(scene)}
         for less in ("step 10°", "1 frame", "exposed to 5%"):

@@ -9,7 +9,7 @@ from acquisition.benchmark.studies.window_methods import (
     window_studies,
 )
 from acquisition.benchmark.window_truth import picture, shipped_camera
-from tests.support.benchmark import FEW
+from tests.support.benchmark import FEW, trial_of
 from tests.support.cpu_time import cpu_ratio
 
 
@@ -18,13 +18,13 @@ def test_exact_coverage_is_accurate_at_every_view_angle() -> None:
     frames, angles = window_studies(FEW)
     own = frames.scenes[1]
     assert own == "640 × 512 pixels"
-    assert frames.trial(own, "exact coverage").error < 1e-4
-    assert frames.trial(own, "crop").error > 1e-3
+    assert trial_of(frames, own, "exact coverage").error < 1e-4
+    assert trial_of(frames, own, "crop").error > 1e-3
     for study in (frames, angles):
         for scene in study.scenes:
-            exact = study.trial(scene, "exact coverage")
-            assert exact.error < study.trial(scene, "mask").error
-    assert angles.trial(angles.scenes[0], "exact coverage").error < 1e-5
+            exact = trial_of(study, scene, "exact coverage")
+            assert exact.error < trial_of(study, scene, "mask").error
+    assert trial_of(angles, angles.scenes[0], "exact coverage").error < 1e-5
 
 
 def test_cost_of_exact_coverage() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.emulated.modbus_tcp_gateway import ModbusTcpGateway
+from tests.support.stages.modbus_tcp_gateway import ModbusTcpGateway
 
 
 def test_a_request_to_an_unknown_unit_gets_exception_0b() -> None:
