@@ -40,6 +40,7 @@ _FINE_STEPS = (17, 17, 33, 65)
 _ACCURATE = 20.0  # a reference is so many times more accurate than the tolerance it checks
 _REFERENCES = ("exact", "fine")
 _TABLE = "table"
+_MOST_ERROR = 1e300  # stands for an infinite one, with which a product by 0 would be undefined
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,7 +204,7 @@ class _Scene:
         errors = np.empty((len(albedos), len(sigmas), at.size))
         for (k, albedo), (row, sigma) in product(enumerate(albedos), enumerate(sigmas)):
             found, exact = (m.kernel(geometry, albedo, sigma) for m in (method, reference))
-            errors[k, row] = relative_error(found, exact)
+            errors[k, row] = np.clip(relative_error(found, exact), -_MOST_ERROR, _MOST_ERROR)
         own = reference.bound(geometry, ranges)
         largest = np.abs(errors).max(axis=(0, 1))
         least = np.maximum(largest - own * (1 + largest), 0.0)

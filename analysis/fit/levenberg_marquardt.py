@@ -33,6 +33,7 @@ _ZERO = 1e-26  # a chi2 below this fraction of the first one is rounding
 _STATIONARY, _ROUGHLY_STATIONARY = 1e-9, 1e-3
 _FIRST_DAMPING, _MIN_DAMPING, _MAX_DAMPING = 1e-3, 1e-12, 1e12
 _SHORT_STEPS = 1.0  # with more damping, steps are so short that a small gain proves no minimum
+_NO_EFFECT = 1e-200  # squared derivative of the residuals, in u per unit: smaller ones underflow
 _ROUNDING = 1e-12  # of the model or its derivative, relative to the sum of its terms
 _MAX_FACES = 10  # of the box of bounds that one step may visit, per parameter
 _CONVERGED, _NO_STEP = "chi2 has converged", "no step lowers chi2 any further"
@@ -57,10 +58,14 @@ class _Quadratic(NamedTuple):
     curvature: FloatArray
 
     def fixed(self) -> BoolArray:
-        """Parameters at a bound that descent would cross, and those without any effect."""
+        """Parameters at a bound that descent would cross, and those without effect."""
         at_low = (self.x <= self.low) & (self.gradient >= 0)
         at_high = (self.x >= self.high) & (self.gradient <= 0)
-        return np.asarray(at_low | at_high | (np.diag(self.curvature) <= 0))
+        return np.asarray(at_low | at_high | ~self.effective())
+
+    def effective(self) -> BoolArray:
+        """Parameters on which the residuals depend."""
+        return np.asarray(np.diag(self.curvature) > _NO_EFFECT)
 
     def stationary(self, chi2: float, tolerance: float) -> bool:
         """True where no free parameter has a gradient beyond `tolerance`, as a cosine."""
@@ -120,7 +125,8 @@ def descend(
         weighted = J.T if huber is None else J.T * weights(r, huber)
         return _Quadratic(x, low, high, weighted @ r, weighted @ J)
 
-    x, r = start, residual(start)
+    x = np.clip(start, low, high)  # rounding may put a start on a bound beyond it
+    r = residual(x)
     chi2 = loss(r, huber)
     first, damping = chi2, _FIRST_DAMPING
     model = quadratic(x, r)
@@ -165,6 +171,7 @@ def _damped_step(model: _Quadratic, damping: float) -> FloatArray:
         gradient = model.gradient + A @ step
         noise = _ROUNDING * (np.abs(model.gradient) + np.abs(A) @ np.abs(step))
         released = ((step <= down) & (gradient < -noise)) | ((step >= up) & (gradient > noise))
+        released &= model.effective()
         if not np.any(released):
             break
         free |= released

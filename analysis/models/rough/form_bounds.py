@@ -25,14 +25,16 @@ _SIGMAS = 9  # values of sigma in a range at which the tight bound evaluates the
 def map_bound(name: str, geometry: Geometry, ranges: Ranges) -> FloatArray:
     """Largest relative error of one of the MAPPED methods, (N,), at any albedo.
 
-    Infinite beyond LIMIT_DEG, where there is no map; 0 for sigma = 0, where all forms agree.
+    Infinite beyond LIMIT_DEG, where there is no map; but 0 there too for sigma = 0, where all forms
+    agree, the table alone excepted, which has no values there.
     """
     low, high = ranges["sigma_deg"]
+    larger, ratio, dphi = table_coordinates(geometry)
     if high == 0:
-        return np.zeros(geometry.shape)
+        no_table = (larger > LIMIT_DEG) & (name == "table")
+        return np.where(no_table, np.inf, 0.0)
     rows = cells_of(GRID["sigma_deg"], low, high)
     levels = maps()["rough"][MAPPED.index(name), rows].max(axis=0)
-    larger, ratio, dphi = table_coordinates(geometry)
     at = (
         cell_at(GRID["larger_deg"], larger),
         cell_at(GRID["ratio"], ratio),

@@ -182,3 +182,11 @@ def test_the_search_costs_less_than_it_saves() -> None:
         oren_nayar_exact_brdf(anywhere, 0.8, 20.0)
 
     assert cpu_seconds(search, 3) < 0.2 * cpu_seconds(integrate, 2)
+
+
+def test_beyond_its_end_the_table_is_not_used_even_for_a_smooth_surface() -> None:
+    edge = Geometry.from_degrees(theta_i=90.0, theta_r=[85.0, -80.0, 0.0])
+    ranges = {"albedo": (1.0, 1.0), "sigma_deg": (0.0, 0.0)}
+    found = cheapest(ROUGH_SURFACE, edge, ranges, 0.3)
+    values = {"albedo": 1.0, "sigma_deg": 0.0}
+    assert found.brdf(edge, **values) == pytest.approx(1 / np.pi)

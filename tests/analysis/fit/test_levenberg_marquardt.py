@@ -302,3 +302,22 @@ def test_the_huber_loss_is_quadratic_then_linear() -> None:
     ]
     assert 2 * r * weights(r, HUBER) == pytest.approx(gradient, abs=1e-5)
     assert weights(r, None).tolist() == [1] * 5
+
+
+def test_a_start_that_rounding_put_beyond_a_bound_counts_as_on_it() -> None:
+    low, high = np.zeros(2), np.ones(2)
+    A = np.array([[1.0, 0.3], [0.3, 1.0], [0.5, 0.2]])
+    b = A @ np.array([2.0, 3.0])  # the minimum is beyond both bounds
+    start = np.array([0.5, 1.0 + 2e-15])
+    found = descend(lambda x: A @ x - b, lambda _: A, start, low, high)
+    assert found.converged
+    assert found.x.tolist() == [1.0, 1.0]
+
+
+@given(st.floats(-320.0, -101.0), st.booleans())
+def test_a_parameter_whose_effect_underflows_stays_where_it_is(power: float, bound: bool) -> None:
+    J = np.array([[1.0, 0.0], [0.0, 10.0**power], [0.0, 10.0**power]])
+    b = np.array([0.3, 1.0, 2.0])
+    start = np.array([0.0, 0.0 if bound else 0.4])
+    found = descend(lambda x: J @ x - b, lambda _: J, start, np.zeros(2), np.ones(2))
+    assert found.x == pytest.approx([0.3, start[1]])
