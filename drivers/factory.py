@@ -82,17 +82,11 @@ def _zaber(name: str, axis: ZaberAxis, port: str, lines: Lines) -> MotorStage:
 
 
 def _oriental(name: str, axis: OrientalAxis, port: str, lines: Lines) -> MotorStage:
-    from drivers.stages.oriental import OrientalSettings, OrientalStage
+    from drivers.lines.modbus_client import BusSettings
+    from drivers.stages.oriental import OrientalStage
 
-    settings = OrientalSettings(
-        port=port,
-        steps_per_deg=axis.steps_per_deg,
-        limits=_limits(axis),
-        baudrate=axis.baudrate,
-        parity=axis.parity,
-        unit=axis.unit,
-    )
-    return OrientalStage(name, settings, lines.clock, lines.modbus(name, settings.bus))
+    bus = lines.modbus(name, BusSettings(port, axis.baudrate, axis.parity))
+    return OrientalStage(name, bus, axis.unit, axis.steps_per_deg, _limits(axis), lines.clock)
 
 
 def _limits(axis: Wired) -> Limits:

@@ -6,6 +6,7 @@ call. Here each of them becomes `PortGone`.
 
 from __future__ import annotations
 
+import logging
 import math
 import re
 import termios
@@ -22,6 +23,8 @@ REPLY_S = 0.15  # controllers answer within 10 to 50 ms; a stop waits no longer 
 WRITE_S = 0.5  # pyserial also counts the time for which a busy computer suspends the process
 MAX_LINE_BYTES = 1024  # anything longer is noise
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+
+log = logging.getLogger(__name__)
 
 A = TypeVar("A")
 T = TypeVar("T")
@@ -43,6 +46,18 @@ def number_of(text: str) -> float | None:
     """Return a number written as `-12.5` or `1.2E-05`; None for anything else, nan and inf."""
     value = float(text) if _NUMBER.fullmatch(text) else math.inf
     return value if math.isfinite(value) else None
+
+
+def repeated(question: Callable[[], T], tries: int) -> T:
+    """Return the answer to a question that may be repeated, and is while its answer is lost."""
+    while True:
+        tries -= 1
+        try:
+            return question()
+        except (NoReply, Garbled) as error:
+            log.warning("%s", error)
+            if not tries:
+                raise
 
 
 class Line(Closeable):

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable
 from typing import TypeVar
 
-from drivers.lines.serial_line import Garbled, Line, NoReply
+from drivers.lines.serial_line import Garbled, Line, NoReply, repeated
 from drivers.stages import newport_framing as framing
 from drivers.stages.motion import Limits, Status
 from drivers.stages.motor_stage import MotorStage
@@ -38,14 +38,12 @@ class NewportPort:
         self, letters: str, parse: Callable[[str], T], value: str = "", tries: int = _TRIES
     ) -> T:
         """Return the parsed answer to a query; a query may be repeated."""
-        for _ in range(tries):
-            try:
-                with self.line.lock.hold():
-                    return self._query_once(letters, parse, value)
-            except (NoReply, Garbled) as error:
-                log.warning("%s", error)
-                last = error
-        raise last
+
+        def ask() -> T:
+            with self.line.lock.hold():
+                return self._query_once(letters, parse, value)
+
+        return repeated(ask, tries)
 
     def send(self, letters: str, value: str | float = "") -> None:
         """Send a command, once, and ask for its error code.

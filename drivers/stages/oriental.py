@@ -8,12 +8,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
 
 from drivers.lines.modbus_bus import AnswerLost, ModbusBus, ModbusUnit
-from drivers.lines.modbus_client import BusSettings
-from drivers.lines.serial_line import REPLY_S
 from drivers.stages import oriental_framing as framing
 from drivers.stages.motion import STARTS_WITHIN_S, Limits, Status
 from drivers.stages.motor_stage import POLL_S, MotorStage, Stopped
@@ -25,72 +21,43 @@ log = logging.getLogger(__name__)
 _RESYNC_COUNTS = (6, 8, 10, 12, 14)  # of the direct data; no other request here has these lengths
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OrientalSettings:
-    """Address of a drive, its scale and its limits.
-
-    `port`: a serial device's path, or `tcp://host:port` of a gateway. `steps_per_deg` follows from
-    the gear and the drive's electronic gear. `current` counts 0.1 %. `reply_s`: seconds.
-    """
-
-    port: str
-    steps_per_deg: float
-    limits: Limits
-    baudrate: int = 115200
-    parity: Literal["E", "N", "O"] = "E"
-    unit: int = 1
-    current: int = framing.FULL_CURRENT
-    reply_s: float = REPLY_S
-
-    def __post_init__(self) -> None:
-        if not self.steps_per_deg > 0:
-            raise InputError(f"steps_per_deg: {self.steps_per_deg:g}: it must be above 0")
-        if self.limits.tolerance_deg < 0.5 / self.steps_per_deg:
-            raise InputError(
-                f"tolerance_deg: {self.limits.tolerance_deg:g} deg: less than half a step "
-                f"({0.5 / self.steps_per_deg:g} deg) cannot be kept"
-            )
-        if not 0 < self.current <= framing.FULL_CURRENT:
-            raise InputError(
-                f"current: {self.current}: 1 to {framing.FULL_CURRENT}, in 0.1 %, is allowed"
-            )
-
-    @property
-    def bus(self) -> BusSettings:
-        """Settings of the line, which other drives may share."""
-        return BusSettings(self.port, self.baudrate, self.parity, self.reply_s)
-
-
 class OrientalStage(MotorStage):
     """One AZ drive. Drives on one port share a `bus`, which is closed by whoever opened it.
 
-    `opening_report` quotes the drive's registers as they were when it was opened.
+    `steps_per_deg` follows from the gear and the drive's electronic gear. Raises `InputError` for a
+    tolerance that the drive's steps cannot keep.
     """
 
     def __init__(
-        self, name: str, settings: OrientalSettings, clock: Clock, bus: ModbusBus | None = None
+        self,
+        name: str,
+        bus: ModbusBus,
+        unit: int,
+        steps_per_deg: float,
+        limits: Limits,
+        clock: Clock,
     ) -> None:
-        line = bus or ModbusBus(name, settings.bus, clock)
-        super().__init__(name, settings.limits, clock, None if bus else line)
-        self._settings = settings
-        self._drive = ModbusUnit(line, name, settings.unit, framing.DIRECT_DATA, _RESYNC_COUNTS)
+        if limits.tolerance_deg < 0.5 / steps_per_deg:
+            raise InputError(
+                f"tolerance_deg: {limits.tolerance_deg:g} deg: less than half a step "
+                f"({0.5 / steps_per_deg:g} deg) cannot be kept"
+            )
+        super().__init__(name, limits, clock)
+        self._unit, self._steps_per_deg = unit, steps_per_deg
+        self._drive = ModbusUnit(bus, name, unit, framing.DIRECT_DATA, _RESYNC_COUNTS)
         self._stops, self._cleared = 0, -1  # stops sent; how many of them are cleared in 007D
-        try:
-            self.opening_report, self._target_steps = self._identify()
-        except BaseException:
-            self.close()
-            raise
+        self._target_steps = self._identify()
 
     def identity(self) -> str:
         """Return the drive's kind and its unit address; it has no name or serial number."""
-        return f"Oriental Motor AZ drive, by its registers, unit {self._settings.unit}"
+        return f"Oriental Motor AZ drive, by its registers, unit {self._unit}"
 
     def status(self, retry: bool = True) -> Status:
         """Read the output word, then the feedback position."""
         until_s = self._drive.deadline_s() if retry else self._clock.now_s()
         output = self._output(until_s)  # first: the position read after it is then one at rest
         return Status(
-            framing.degrees_of(self._feedback(until_s), self._settings.steps_per_deg),
+            framing.degrees_of(self._feedback(until_s), self._steps_per_deg),
             moving=output.has(framing.MOVE),
             homed=output.has(framing.HOME_END),
             fault=output.fault,
@@ -100,8 +67,8 @@ class OrientalStage(MotorStage):
         """Return infinite limits: the registers of an AZ drive's software limits are not known."""
         return -float("inf"), float("inf")
 
-    def _identify(self) -> tuple[str, int]:
-        """Return a report of the registers and the target held; refuse what is no AZ drive."""
+    def _identify(self) -> int:
+        """Return the target held in the registers; refuse what is no AZ drive."""
         until_s = self._drive.deadline_s()
         output = self._output(until_s)
         data = self._direct_data(until_s)
@@ -111,8 +78,7 @@ class OrientalStage(MotorStage):
                 f"{self.name}: {self._drive.where} is no Oriental Motor AZ drive: {mismatch}: look "
                 "at the port and the unit address in the rig file"
             )
-        alarm = f"alarm {output.alarm:02X}h" if output.alarm else "no alarm"
-        return f"output {output.word:04X} hex, {alarm}, {data}", data.position
+        return data.position
 
     def _send_home(self) -> None:
         self._wait_until_ready("look for its reference")
@@ -123,13 +89,12 @@ class OrientalStage(MotorStage):
         """Do nothing: each move command contains its speed."""
 
     def _send_move(self, angle_deg: float) -> None:
-        scale, limits = self._settings.steps_per_deg, self._limits
+        scale, limits = self._steps_per_deg, self._limits
         target = framing.steps_of(angle_deg, scale)
         block = framing.move_block(
             target,
             framing.steps_of(limits.speed_deg_per_s, scale),
             framing.steps_of(limits.acceleration_deg_per_s2, scale),
-            self._settings.current,
         )
         self._wait_until_ready("move")
         until_s, before = self._drive.deadline_s(), self._target_steps
@@ -183,7 +148,7 @@ class OrientalStage(MotorStage):
         # The target is the previous one: only motion or arrival shows that the move was taken.
         if self._output(until_s).has(framing.MOVE):
             return True
-        allowed = self._limits.tolerance_deg * self._settings.steps_per_deg
+        allowed = self._limits.tolerance_deg * self._steps_per_deg
         return abs(self._feedback(until_s) - target) <= allowed
 
     def _write_once(

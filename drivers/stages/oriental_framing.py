@@ -53,12 +53,6 @@ class DirectData:
     current: int
     trigger: int
 
-    def __str__(self) -> str:
-        return (
-            f"data number {self.number}, type {self.kind}, position {self.position} steps, "
-            f"speed {self.speed_hz} Hz, current {self.current / 10:g} %"
-        )
-
 
 @dataclass(frozen=True, slots=True)
 class Output:
@@ -107,10 +101,8 @@ def degrees_of(steps: int, steps_per_deg: float) -> float:
     return steps / steps_per_deg
 
 
-def move_block(
-    position_steps: int, speed_hz: int, acceleration: int, current: int = FULL_CURRENT
-) -> tuple[int, ...]:
-    """Return the 16 registers from 0058 that start an absolute move.
+def move_block(position_steps: int, speed_hz: int, acceleration: int) -> tuple[int, ...]:
+    """Return the 16 registers from 0058 that start an absolute move at full current.
 
     `speed_hz` is in steps/s. `acceleration` counts 0.001 kHz/s, which is 1 step/s²: four
     independent open drivers of AZ drives use this unit, and the maker's example agrees (05DC hex =
@@ -120,7 +112,7 @@ def move_block(
     """
     parts = (
         0, ABSOLUTE, position_steps, max(speed_hz, 1), max(acceleration, 1), max(acceleration, 1),
-        current, TRIGGER_ALL,
+        FULL_CURRENT, TRIGGER_ALL,
     )  # fmt: skip
     return tuple(word for part in parts for word in words_of(part))
 

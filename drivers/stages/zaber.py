@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from drivers.lines.serial_line import Garbled, Line, NoReply, number_of
+from drivers.lines.serial_line import Garbled, Line, NoReply, number_of, repeated
 from drivers.stages import zaber_framing as framing
 from drivers.stages.motion import Limits, Status
 from drivers.stages.motor_stage import MotorStage
@@ -33,13 +33,7 @@ class ZaberPort:
 
     def query(self, text: str, axis: int | None = None, tries: int = _TRIES) -> Reply:
         """Return the reply to a command that changes nothing and may be repeated."""
-        for _ in range(tries):
-            try:
-                return self.send(text, axis)
-            except (NoReply, Garbled) as error:
-                log.warning("%s", error)
-                last = error
-        raise last
+        return repeated(lambda: self.send(text, axis), tries)
 
     def send(self, text: str, axis: int | None = None) -> Reply:
         """Send a command, once; raise `DeviceError` with the reason if it is refused."""

@@ -20,14 +20,15 @@ from instrument.clock import SystemClock
 from instrument.errors import DeviceError
 from sim.emulated.wire import Fault, PtyWire
 from tests.support.stages.emulated_az_drive import (
+    LIMITS,
     SLOW,
     SLOW_LIMITS,
     STEPS_PER_DEG,
     WIRES,
     EmulatedDrive,
-    az_settings,
     emulated_drive,
 )
+from tests.support.stages.kinds import AzStage
 from tests.support.stages.waiting import wait_until
 
 pytestmark = pytest.mark.waits
@@ -65,8 +66,8 @@ def az(request: pytest.FixtureRequest) -> Iterator[EmulatedDrive]:
 def test_fault_while_opening(kind: str, fault: str, after: int) -> None:
     with emulated_drive(kind, reply_s=REPLY_S) as az:
         az.wire.inject(*[None] * after, FAULTS[fault])
-        told = _outcome(fault, lambda: az.open().opening_report)
-        assert told is None or "output 4020 hex, no alarm" in told
+        told = _outcome(fault, lambda: az.open().identity())
+        assert told is None or "AZ drive" in told
         assert az.wire.pending == 0
 
 
@@ -217,12 +218,12 @@ def test_a_late_answer_is_never_taken_for_another(late: float) -> None:
 )
 def test_a_missing_port_is_named(port: str, says: str) -> None:
     with pytest.raises(PortGone, match=says):
-        OrientalStage("theta_r", az_settings(port, parity="E"), SystemClock())
+        AzStage(BusSettings(port), LIMITS)
 
 
 def test_a_parity_that_the_port_refuses_is_named() -> None:
     with PtyWire([]) as wire, pytest.raises(PortGone, match=r"'X': look at .*, at the parity"):
-        OrientalStage("theta_r", az_settings(wire.port, parity="X"), SystemClock())
+        AzStage(BusSettings(wire.port, parity="X"), LIMITS)  # type: ignore[arg-type]
 
 
 def test_a_closed_line_stays_closed(az: EmulatedDrive) -> None:

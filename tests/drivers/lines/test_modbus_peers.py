@@ -23,7 +23,6 @@ import pytest
 
 from drivers.lines.modbus_bus import ModbusBus, ModbusUnit
 from drivers.lines.modbus_client import BusSettings
-from drivers.stages.oriental import OrientalStage
 from drivers.stages.oriental_framing import (
     DIRECT_DATA,
     DIRECT_DATA_COUNT,
@@ -39,7 +38,8 @@ from instrument.errors import DeviceError
 from sim.emulated.motor import Motor
 from sim.emulated.oriental_controller import OrientalController
 from sim.emulated.wire import PtyWire
-from tests.support.stages.emulated_az_drive import FAST, az_settings
+from tests.support.stages.emulated_az_drive import FAST, LIMITS
+from tests.support.stages.kinds import AzStage
 from tests.support.stages.modbus_tcp_gateway import ModbusTcpGateway, TcpWire
 
 pytestmark = pytest.mark.waits
@@ -217,13 +217,13 @@ def test_our_line_with_a_slave_of_pymodbustcp() -> None:
 def test_a_foreign_slave_is_no_az_drive(tmp_path: Path) -> None:
     with _joined_ports() as (theirs, ours):
         running = subprocess.Popen([_compiled(tmp_path), theirs, "1"])
-        settings = az_settings(ours)
+        settings = BusSettings(ours, parity="N")
         try:
             with ModbusBus("peer", settings.bus, SystemClock()) as bus:
                 unit = ModbusUnit(bus, "peer", 1, DIRECT_DATA, (6, 8))
                 unit.write(DIRECT_DATA + 1, [999], unit.deadline_s())
             with pytest.raises(DeviceError, match="is no Oriental Motor AZ drive: data number 999"):
-                OrientalStage("theta_r", settings, SystemClock())
+                AzStage(settings, LIMITS)
         finally:
             running.kill()
             running.wait()

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 import sim.emulated.oriental_controller
 from drivers.lines.modbus_bus import ModbusBus
+from drivers.lines.modbus_client import BusSettings
 from drivers.lines.serial_line import NoReply
 from drivers.stages.motor_stage import Stopped
-from drivers.stages.oriental import OrientalSettings, OrientalStage
+from drivers.stages.oriental import OrientalStage
 from instrument.clock import SystemClock
 from instrument.errors import DeviceError, InputError
 from sim.emulated.motor import Motor
@@ -29,9 +30,9 @@ from tests.support.stages.emulated_az_drive import (
     STEPS_PER_DEG,
     WIRES,
     EmulatedDrive,
-    az_settings,
     emulated_drive,
 )
+from tests.support.stages.kinds import AzStage
 from tests.support.stages.modbus_tcp_gateway import ModbusTcpGateway, TcpWire
 from tests.support.stages.waiting import wait_until
 
@@ -53,10 +54,9 @@ def slow_az(request: pytest.FixtureRequest) -> Iterator[EmulatedDrive]:
         yield made
 
 
-def test_identity_and_opening_report(az: EmulatedDrive) -> None:
+def test_identity(az: EmulatedDrive) -> None:
     stage = az.open()
     assert stage.identity() == "Oriental Motor AZ drive, by its registers, unit 1"
-    assert "output 4020 hex, no alarm" in stage.opening_report
 
 
 def test_homing_moves_and_positions(az: EmulatedDrive) -> None:
@@ -235,9 +235,9 @@ def test_several_drives_share_one_line(kind: str) -> None:
     drives = [OrientalController(Motor(FAST, SystemClock()), unit, 100.0) for unit in (1, 2)]
     with PtyWire(drives) if kind == "pty" else TcpWire([ModbusTcpGateway(drives)]) as wire:
         port = wire.port if isinstance(wire, PtyWire) else f"tcp://localhost:{wire.port}"
-        one, two = (az_settings(port, unit=unit) for unit in (1, 2))
-        with ModbusBus("line", one.bus, SystemClock()) as bus:
-            stages = [OrientalStage(f"axis {s.unit}", s, SystemClock(), bus) for s in (one, two)]
+        clock = SystemClock()
+        with ModbusBus("line", BusSettings(port, parity="N"), clock) as bus:
+            stages = [OrientalStage(f"axis {u}", bus, u, 100.0, LIMITS, clock) for u in (1, 2)]
             for stage in stages:
                 stage.home()
             wire.inject(Fault("late", 0.16))
@@ -276,14 +276,14 @@ class Parrot:
 )
 def test_a_device_that_does_not_answer_like_a_drive_is_refused(answer: str, says: str) -> None:
     with PtyWire([Parrot(answer)]) as wire, pytest.raises(DeviceError, match=says):
-        OrientalStage("theta_r", az_settings(wire.port, reply_s=0.1), SystemClock())
+        AzStage(BusSettings(wire.port, parity="N", reply_s=0.1), LIMITS)
 
 
 @settings(max_examples=15)
 @given(st.binary(min_size=1, max_size=40))
 def test_noise_instead_of_an_answer_is_a_device_error(noise: bytes) -> None:
     with PtyWire([Parrot(noise.hex(), check=False)]) as wire, pytest.raises(DeviceError):
-        OrientalStage("theta_r", az_settings(wire.port, reply_s=0.004), SystemClock())
+        AzStage(BusSettings(wire.port, parity="N", reply_s=0.004), LIMITS)
 
 
 def test_a_device_with_values_out_of_range_is_refused() -> None:
@@ -311,9 +311,6 @@ def test_a_move_costs_few_requests_and_little_time(az: EmulatedDrive) -> None:
     assert min(spent) < 0.04
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"steps_per_deg": 0.0}, {"steps_per_deg": 10.0}, {"current": 1001}, {"current": 0}]
-)
-def test_settings_that_cannot_be_kept_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(InputError, match=r"0|tolerance_deg|1001"):
-        OrientalSettings(**{"port": "x", "steps_per_deg": 100.0, "limits": LIMITS} | wrong)  # type: ignore[arg-type]  # one wrong value at a time
+def test_a_tolerance_of_less_than_half_a_step_is_refused() -> None:
+    with PtyWire([]) as wire, pytest.raises(InputError, match=r"tolerance_deg: 0.001 deg: less"):
+        AzStage(BusSettings(wire.port, parity="N"), replace(LIMITS, tolerance_deg=0.001))

@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
+from drivers.lines.modbus_client import BusSettings
 from drivers.stages.motion import Limits
-from drivers.stages.oriental import OrientalSettings, OrientalStage
 from instrument.clock import SystemClock
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.oriental_controller import OrientalController
 from sim.emulated.wire import PtyWire
 from tests.support.stages.emulated_stages import port_of
+from tests.support.stages.kinds import AzStage
 from tests.support.stages.modbus_tcp_gateway import ModbusTcpGateway, TcpWire
 
 STEPS_PER_DEG = 100.0
@@ -31,12 +32,6 @@ MAKERS_EXAMPLE = bytes.fromhex(
 )
 
 
-def az_settings(port: str, **changes: object) -> OrientalSettings:
-    """Settings of a drive with 100 steps per degree on this port."""
-    plain = OrientalSettings(port=port, steps_per_deg=STEPS_PER_DEG, limits=LIMITS, parity="N")
-    return replace(plain, **changes)  # type: ignore[arg-type]  # the caller's
-
-
 @dataclass
 class EmulatedDrive:
     """A wire with one drive on it. `reply_s`: time-out given to the driver."""
@@ -45,7 +40,7 @@ class EmulatedDrive:
     drive: OrientalController
     limits: Limits
     reply_s: float
-    stages: list[OrientalStage] = field(default_factory=list)
+    stages: list[AzStage] = field(default_factory=list)
 
     @property
     def motor(self) -> Motor:
@@ -55,12 +50,12 @@ class EmulatedDrive:
     def port(self) -> str:
         return port_of(self.wire)
 
-    def open(self, unit: int = 1) -> OrientalStage:
-        settings = az_settings(self.port, limits=self.limits, unit=unit, reply_s=self.reply_s)
-        self.stages.append(OrientalStage("theta_r", settings, SystemClock()))
+    def open(self, unit: int = 1) -> AzStage:
+        settings = BusSettings(self.port, parity="N", reply_s=self.reply_s)
+        self.stages.append(AzStage(settings, self.limits, unit=unit))
         return self.stages[-1]
 
-    def homed(self) -> OrientalStage:
+    def homed(self) -> AzStage:
         stage = self.open()
         stage.home()
         return stage

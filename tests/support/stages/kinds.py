@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from drivers.lines.modbus_bus import ModbusBus
+from drivers.lines.modbus_client import BusSettings
 from drivers.lines.serial_line import Line
 from drivers.stages.motion import Limits
 from drivers.stages.motor_stage import MotorStage
 from drivers.stages.newport import NewportStage
-from drivers.stages.oriental import OrientalSettings, OrientalStage
+from drivers.stages.oriental import OrientalStage
 from drivers.stages.zaber import ZaberStage
-from instrument.clock import Clock
+from instrument.clock import Clock, SystemClock
 from sim.emulated.motor import Motor
 from sim.emulated.newport_controller import NewportController
 from sim.emulated.oriental_controller import OrientalController
@@ -63,5 +65,28 @@ def open_stage(kind: str, port: str, limits: Limits, clock: Clock) -> MotorStage
     if kind == "zaber":
         line = Line("theta_r", port, 115200, clock)
         return ZaberStage("theta_r", line, 1, 1, MICROSTEPS_PER_DEG, limits, clock)
-    settings = OrientalSettings(port=port, steps_per_deg=STEPS_PER_DEG, limits=limits, parity="N")
-    return OrientalStage("theta_r", settings, clock)
+    return AzStage(BusSettings(port, parity="N"), limits, clock, steps_per_deg=STEPS_PER_DEG)
+
+
+class AzStage(OrientalStage):
+    """AZ drive on a line of its own, which is closed with the stage."""
+
+    def __init__(
+        self,
+        settings: BusSettings,
+        limits: Limits,
+        clock: Clock | None = None,
+        unit: int = 1,
+        steps_per_deg: float = 100.0,
+    ) -> None:
+        clock = clock or SystemClock()
+        self.bus = ModbusBus("theta_r", settings, clock)
+        try:
+            super().__init__("theta_r", self.bus, unit, steps_per_deg, limits, clock)
+        except BaseException:
+            self.bus.close()
+            raise
+
+    def close(self) -> None:
+        super().close()
+        self.bus.close()
