@@ -13,7 +13,13 @@ from rich.table import Table
 from acquisition.commands.fit_status import no_fit_reported, print_json, require_result
 from acquisition.results.model_check import check_model
 from acquisition.results.sources import Source, Wanted, read_source
-from acquisition.results.summary import VERDICTS, parameters_of, validity_note, value_text
+from acquisition.results.summary import (
+    VERDICTS,
+    paper_ratio_note,
+    parameters_of,
+    validity_note,
+    value_text,
+)
 from acquisition.terminal.console import out
 from analysis.choice.choice import Choice, choose
 from analysis.choice.fit_json import to_json
@@ -148,6 +154,9 @@ def _notes(source: Source, chosen: FitResult) -> list[str]:
     outside = validity_note(chosen)
     if outside:
         found.append(outside)
+    ratio = paper_ratio_note(chosen)
+    if ratio:
+        found.append(ratio)
     if m.relative:
         found.append("the values are relative: parameters that only scale them are undetermined")
     for k in np.flatnonzero(chosen.outliers)[:10]:

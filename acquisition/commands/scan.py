@@ -8,6 +8,7 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
+from acquisition.commands.determinable import Determinable
 from acquisition.commands.fit_status import no_fit_reported, print_json, require_result
 from acquisition.commands.scan_session import scan
 from acquisition.commands.views import print_outcome, print_plan
@@ -82,18 +83,21 @@ def show_plan(protocol_path: Path, rig_path: Path | None, as_json: bool) -> None
     loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
     plan = make_plan(loaded)
     if as_json:
-        sys.stdout.write(json.dumps(_plan_json(plan), allow_nan=False) + "\n")
+        sys.stdout.write(json.dumps(_plan_json(loaded, plan), allow_nan=False) + "\n")
     else:
         print_plan(loaded, plan)
 
 
-def _plan_json(plan: Plan) -> dict[str, object]:
+def _plan_json(loaded: Loaded, plan: Plan) -> dict[str, object]:
+    determinable = Determinable.of(loaded.protocol)
     return {
         "points": len(plan.points),
         "hidden": [pose._asdict() for pose in plan.hidden],
         "duration_s": plan.duration_s,
         "surface_changes": plan.swaps,
         "hand_settings": plan.hand_settings,
+        "can_determine": determinable.yes,
+        "will_not_determine": determinable.no,
         "steps": [asdict(step) | {"pose": step.pose._asdict()} for step in plan.steps],
     }
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
+from acquisition.commands.determinable import Determinable
 from acquisition.engine.frame_files import frame_bytes
 from acquisition.plan.plan import Plan
 from acquisition.terminal.console import duration_text, out
@@ -49,6 +50,13 @@ def _plan_rows(loaded: Loaded, plan: Plan) -> Iterator[tuple[str, str]]:
         + (f": (theta_i, dphi, theta_r) = {hidden}{more}" if hidden else ""),
     )
     yield "references", f"{tiles} white tile, {drifts} drift checks"
+    determinable = Determinable.of(loaded.protocol)
+    if determinable.no:
+        yield (
+            "no white tile",
+            f"radiance is relative: the fit will not determine {', '.join(determinable.no)}; "
+            f"it can determine {', '.join(determinable.yes)}",
+        )
     yield (
         "operator",
         f"places sample or tile {plan.swaps} times, sets the lamp {plan.hand_settings} times"

@@ -16,7 +16,7 @@ from analysis.data.csv_table import read_table
 from analysis.data.curet import read_curet
 from analysis.data.measurements import Measurements, SharedError
 from instrument.config.protocol import FitConfig
-from instrument.errors import InputError, NoMeasurement, NotDetermined
+from instrument.errors import AllFlagged, InputError, NoMeasurement, NotDetermined
 from instrument.record.record import FILE_NAME, Record
 
 FORMATS = ("auto", "run", "csv", "curet")
@@ -125,6 +125,8 @@ def _run(path: Path) -> Source:
 def _csv(path: Path, wanted: Wanted) -> Source:
     table = read_table(path)
     m = table.measurements
+    if not m.size:
+        raise AllFlagged(f"all {table.flagged} points are flagged: there is nothing to fit")
     notes = _flagged(table.flagged, table.flagged + m.size)
     source = Source(m, table.acceptance, notes)
     return _with_assumptions(source, wanted, states_shared=table.states_shared)

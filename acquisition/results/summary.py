@@ -23,6 +23,7 @@ VERDICTS = {
     "none adequate": "the best of the models, but none explains the data within their uncertainty",
     "not identifiable": "agrees with the data, but they do not determine all of its parameters",
 }
+_PAPER_RATIO = "ks/albedo"
 _UNITS = {"degrees": "°", "1": ""}
 
 
@@ -42,8 +43,8 @@ def value_text(parameter: Parameter) -> str:
 
 
 def parameters_of(result: FitResult) -> tuple[Parameter, ...]:
-    """Return a candidate's parameters in the model's order."""
-    return tuple(
+    """Return a candidate's parameters in the model's order, and the ratios of its scales."""
+    parameters = (
         Parameter(
             name=p.name,
             value=result.values[p.name],
@@ -53,6 +54,28 @@ def parameters_of(result: FitResult) -> tuple[Parameter, ...]:
         )
         for p in result.problem.model.parameters
     )
+    ratios = (
+        Parameter(name=name, value=r.value, u=r.u, interval=r.interval, unit="")
+        for name, r in result.ratios.items()
+    )
+    return (*parameters, *ratios)
+
+
+def paper_ratio_note(chosen: FitResult) -> str:
+    """Return the lobe's strength as the 1995 paper states it: k_s/k_d, beside an albedo rho.
+
+    The paper's lobe (37) leaves out the factor 1/4, and its diffuse part is k_d times that of a
+    surface with the albedo rho: k_d = albedo / rho.
+    """
+    ratio = chosen.ratios.get(_PAPER_RATIO)
+    if ratio is None or ratio.u is None:
+        return ""
+    text = "k_s/k_d as in Oren and Nayar (1995), whose lobe (37) leaves out the factor 1/4, is "
+    ks, u_ks = chosen.values["ks"], chosen.u["ks"]
+    if u_ks is not None and chosen.u["albedo"] is not None:
+        return f"{text}ks/4 = {format_value(ks / 4, u_ks / 4, '')}, for rho = albedo and k_d = 1"
+    quarter = format_value(ratio.value / 4, ratio.u / 4, "")
+    return f"{text}rho times {quarter} = ks/albedo/4, where rho is the albedo"
 
 
 def budget(reduced: Reduced, u_brdf: FloatArray) -> Budget:
@@ -83,6 +106,7 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         _interruptions_note(record),
         fitted.reason if fitted.choice is not None else "",
         validity_note(fitted.chosen) if fitted.chosen is not None else "",
+        paper_ratio_note(fitted.chosen) if fitted.chosen is not None else "",
         _hidden_note(record),
         _flag_note(reduced),
         _drift_note(reduced),

@@ -8,6 +8,7 @@ from typing import Any
 from analysis.choice.choice import Choice
 from analysis.choice.symmetry_test import Symmetry
 from analysis.fit.fit import FitResult
+from analysis.fit.scale_ratios import Ratio
 from instrument.errors import NoMeasurement, NotDetermined
 
 
@@ -38,6 +39,7 @@ def _candidate(result: FitResult) -> dict[str, Any]:
         "aicc": _number(result.aicc),
         "converged": result.converged,
         "message": result.message,
+        "ratios": {name: _ratio(ratio) for name, ratio in result.ratios.items()},
     }
 
 
@@ -51,9 +53,19 @@ def _symmetry(tested: Symmetry) -> dict[str, Any]:
 
 
 def _parameter(result: FitResult, name: str) -> dict[str, Any]:
-    entry: dict[str, Any] = {"value": _number(result.values[name]), "u": _number(result.u[name])}
-    if name in result.intervals:
-        entry["interval"] = [_number(end) for end in result.intervals[name]]
+    return _estimate(result.values[name], result.u[name], result.intervals.get(name))
+
+
+def _ratio(ratio: Ratio) -> dict[str, Any]:
+    return _estimate(ratio.value, ratio.u, ratio.interval)
+
+
+def _estimate(
+    value: float, u: float | None, interval: tuple[float, float] | None
+) -> dict[str, Any]:
+    entry: dict[str, Any] = {"value": _number(value), "u": _number(u)}
+    if interval is not None:
+        entry["interval"] = [_number(end) for end in interval]
     return entry
 
 

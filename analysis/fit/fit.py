@@ -20,6 +20,7 @@ from analysis.fit.criteria import OUTLIER_U, SIGNIFICANCE, aicc, bic, noise_vari
 from analysis.fit.first_fit import FirstFit, first_fit
 from analysis.fit.problem import Problem
 from analysis.fit.relative_scale import normalise_lamp_levels, unscaled_parameters
+from analysis.fit.scale_ratios import Ratio, scale_ratios
 from analysis.fit.uncertainty import uncertainty
 from analysis.models import Model
 from analysis.models.base import Validity
@@ -35,7 +36,8 @@ class FitResult:
     problem, x: the problem solved, and the parameters (K,) in the model's order. values: the same
     by name. u: standard uncertainties, None where none is valid; `intervals` then has the 95 %
     profile-likelihood interval. undetermined: parameters whose interval is more than half of their
-    domain. correlation: (K, K), NaN for a parameter without u.
+    domain. correlation: (K, K), NaN for a parameter without u. ratios: those of the model's scales
+    that the data determine, by name such as "ks/albedo".
     predicted: (N,) in 1/sr. u_total: (N,) in 1/sr, of each point; estimated from the residuals
     where no u is stated. residuals: (N,), measured minus predicted, less the most likely values of
     the errors that points share, in units of the independent part of u. pulls: those most likely
@@ -55,6 +57,7 @@ class FitResult:
     intervals: Mapping[str, tuple[float, float]]
     undetermined: tuple[str, ...]
     correlation: FloatArray
+    ratios: Mapping[str, Ratio]
     predicted: FloatArray
     u_total: FloatArray
     residuals: FloatArray
@@ -189,6 +192,7 @@ def _result(
     noise = noise_variance(m, fitted.problem, found)
     unscaled = unscaled_parameters(problem.model) if m.relative else frozenset[str]()
     known = uncertainty(fitted.problem, found, noise, unscaled, profiles=not ruled_out)
+    ratios = scale_ratios(fitted.problem, found, noise, profiles=not ruled_out)
     predicted = problem.predict(x)
     residual = m.brdf - predicted
     scale = math.sqrt(noise) if m.u_random is None and problem.huber is None else 1.0
@@ -212,6 +216,7 @@ def _result(
         intervals=known.intervals,
         undetermined=known.undetermined,
         correlation=known.correlation,
+        ratios=ratios,
         predicted=predicted,
         u_total=covariance.u_total * scale,
         residuals=unshared,

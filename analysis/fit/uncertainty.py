@@ -48,12 +48,13 @@ def uncertainty(
     variance: float,
     unscaled_parameters: Collection[str] = (),
     profiles: bool = True,
+    only: Collection[str] | None = None,
 ) -> Uncertainty:
     """Uncertainties of the parameters at a minimum, in their own units.
 
     `variance` is that of the whitened residuals: 1 where the data's u is stated, else estimated.
     `unscaled_parameters`: those that need a reference which was not measured, so not determined.
-    Without `profiles` an interval is the whole domain.
+    Without `profiles` an interval is the whole domain. `only`: names of the parameters wanted.
     """
     bound = (best.x == problem.low) | (best.x == problem.high)
     C, invalid = _linearised(problem, best.x, variance, ~bound)
@@ -64,13 +65,16 @@ def uncertainty(
     intervals: dict[str, tuple[float, float]] = {}
     undetermined = []
     for i, parameter in enumerate(problem.model.parameters):
+        if only is not None and parameter.name not in only:
+            continue
         u[parameter.name], ends = minimum.u_or_interval(i, bool(invalid[i]), bool(dependent[i]))
         if ends is None:
             continue
         intervals[parameter.name] = ends
         if parameter.name in unscaled_parameters or ends[1] - ends[0] > minimum.half_domain(i):
             undetermined.append(parameter.name)
-    return Uncertainty(u, intervals, tuple(undetermined), _correlation(C, list(u.values())))
+    correlation = _correlation(C, [u.get(p.name) for p in problem.model.parameters])
+    return Uncertainty(u, intervals, tuple(undetermined), correlation)
 
 
 def _bound_dependent(

@@ -229,7 +229,27 @@ def test_without_a_white_tile_only_the_shape_is_determined(small: Path, tmp_path
     found = next(c for c in fit["candidates"] if c["model"] == fit["chosen"])["parameters"]
     assert found["albedo"]["u"] is None
     assert abs(found["sigma_deg"]["value"] - 20) < 4 * found["sigma_deg"]["u"]
-    assert "radiance is relative" in (tmp_path / "run" / "report.html").read_text()
+    report = (tmp_path / "run" / "report.html").read_text()
+    assert "radiance is relative" in report
+
+
+def test_without_a_white_tile_the_strength_of_the_lobe_is_known_beside_the_diffuse_part(
+    small: Path, tmp_path: Path
+) -> None:
+    """ks/albedo with u in fit.json, in the printed table and in the report; k_s/k_d explained."""
+    text = re.sub(r"  white_tile:.*\n", "", small.read_text())
+    protocol = tmp_path / "relative.yaml"
+    protocol.write_text(text + "fit: {models: [oren_nayar+torrance_sparrow]}\n")
+    done = gonio("run", protocol, "--out", tmp_path / "run")
+    (candidate,) = json.loads((tmp_path / "run" / "fit.json").read_text())["candidates"]
+    ratio = candidate["ratios"]["ks/albedo"]
+    assert abs(ratio["value"] - 0.076 / 0.80) < 4 * ratio["u"] < 0.02
+    words = "k_s/k_d as in Oren and Nayar (1995), whose lobe (37) leaves out the factor 1/4"
+    printed = " ".join(done.stdout.split())
+    fitted = " ".join(gonio("fit", tmp_path / "run").stdout.split())
+    for shown in (printed, fitted, (tmp_path / "run" / "report.html").read_text()):
+        assert "ks/albedo" in shown
+        assert words in shown
 
 
 def test_a_stopped_run_is_reported_as_unfinished(stopped: Path, tmp_path: Path) -> None:

@@ -20,7 +20,17 @@ def test_the_keys_are_as_documented() -> None:
     for candidate in written["candidates"]:
         assert list(candidate) == [
             "model", "parameters", "rms_relative", "reduced_chi2", "bic", "aicc", "converged",
-            "message",
+            "message", "ratios",
         ]  # fmt: skip
         for entry in candidate["parameters"].values():
             assert set(entry) == ({"value", "u"} if entry["u"] else {"value", "u", "interval"})
+
+
+def test_ratios_of_scales_have_a_value_and_u() -> None:
+    name = "lambert+torrance_sparrow"
+    truth = {"albedo": 0.5, "ks": 0.1, "sigma_deg": 20.0}
+    (candidate,) = to_json(choose(scan(name, 1, **truth), models=[name]))["candidates"]
+    assert list(candidate["ratios"]) == ["ks/albedo"]
+    ratio = candidate["ratios"]["ks/albedo"]
+    assert list(ratio) == ["value", "u"]
+    assert abs(ratio["value"] - 0.2) < 4 * ratio["u"]

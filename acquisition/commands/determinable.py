@@ -1,0 +1,32 @@
+"""Parameters that a planned scan can determine, and those that it cannot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from analysis.choice.ladder import LADDER
+from analysis.fit.scale_ratios import ratio_names
+from analysis.models import MODELS
+from instrument.config.protocol import Protocol
+
+
+@dataclass(frozen=True, slots=True)
+class Determinable:
+    """Names of parameters of the models to fit, and of ratios of their scales.
+
+    no: those that the scan will not determine. yes: those that it can, given enough angles.
+    """
+
+    yes: tuple[str, ...]
+    no: tuple[str, ...]
+
+    @classmethod
+    def of(cls, protocol: Protocol) -> Determinable:
+        """Of a scan without a white tile, no scale can be determined: its radiance is relative."""
+        models = [MODELS[name] for name in protocol.fit.models or LADDER]
+        parameters = {p.name: p for model in models for p in model.parameters}
+        ratios = dict.fromkeys(ratio for model in models for ratio in ratio_names(model))
+        absolute = protocol.references.white_tile is not None
+        no = [name for name, p in parameters.items() if p.scale and not absolute]
+        yes = [name for name in parameters if name not in no]
+        return cls((*yes, *ratios), tuple(no))
