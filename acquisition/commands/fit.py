@@ -123,7 +123,10 @@ def _print(source: Source, choice: Choice) -> None:
 def _table(candidates: Sequence[FitResult], chosen: FitResult) -> Table:
     """Candidates by rising BIC; K is the number of parameters, ✗ marks no convergence."""
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for name in ("  candidate", "K", "rms/mean", "χ²/dof", "ΔBIC", "ΔAICc"):
+    table.add_column(
+        "\u00a0\u00a0candidate", overflow="fold"
+    )  # in a narrow terminal this column wraps
+    for name in ("K", "rms/mean", "χ²/dof", "ΔBIC", "ΔAICc"):
         table.add_column(name, no_wrap=True)
     best_bic = min(c.bic for c in candidates)
     best_aicc = min(c.aicc for c in candidates)
@@ -131,7 +134,9 @@ def _table(candidates: Sequence[FitResult], chosen: FitResult) -> Table:
         chi2 = "" if c.reduced_chi2 is None else _short(c.reduced_chi2)
         mark = "→" if c is chosen else "" if c.converged else "✗"
         row = (f"{100 * c.rms_relative:.3g} %", chi2, _short(c.bic - best_bic))
-        table.add_row(f"{mark:1} {c.model}", str(c.x.size), *row, _short(c.aicc - best_aicc))
+        table.add_row(
+            f"{mark:\u00a0<1}\u00a0{c.model}", str(c.x.size), *row, _short(c.aicc - best_aicc)
+        )
     return table
 
 

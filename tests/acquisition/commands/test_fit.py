@@ -12,6 +12,7 @@ import pytest
 
 from analysis.models import MODELS
 from instrument.geometry import Geometry
+from tests.support.command import gonio as gonio_process
 from tests.support.command import gonio_here as gonio
 from tests.support.paths import ROOT
 from tests.support.scans import small_demo
@@ -55,6 +56,24 @@ def test_a_person_reads_parameters_candidates_and_why(rough: Path) -> None:
     for words in ("oren_nayar: the simplest model", "sigma_deg", "±", "ΔBIC", "ΔAICc", "symmetry"):
         assert words in done.stdout
     assert "wolff" not in done.stdout
+
+
+def test_a_narrow_terminal_wraps_names_and_cuts_no_number(
+    rough: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def candidates(columns: int) -> str:
+        monkeypatch.setenv("COLUMNS", str(columns))
+        done = gonio_process(
+            "fit", rough, "--models", "lambert,lambert+torrance_sparrow,oren_nayar"
+        )
+        return done.stdout.partition("ΔAICc")[2].partition("- assumed")[0]
+
+    number = r"-?\d[\d.e+]*"
+    wide, narrow = candidates(200), candidates(50)
+    assert re.findall(number, narrow) == re.findall(number, wide)
+    assert "…" not in narrow
+    assert "lambert+torrance_sparrow" in wide
+    assert "lambert+torrance_sparrow" not in narrow
 
 
 def test_the_rough_surface_is_worked_out_as_asked(rough: Path) -> None:

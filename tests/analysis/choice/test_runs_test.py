@@ -81,6 +81,20 @@ def test_the_failing_stretch_is_named(height: float) -> None:
     assert ("(+" if height > 0 else "(-") in str(worst)
 
 
+def test_a_stretch_over_the_normal_is_named_in_the_plane_of_the_sweep() -> None:
+    """Tables without signs: 180 degrees of dphi on the mirror side, 0 on the lamp's."""
+    views, signed = np.array([20.0, 10.0, 10.0, 20.0]), [-20.0, -10.0, 10.0, 20.0]
+    dphi = np.where(np.array(signed) < 0, 180.0, 0.0)
+    m = Measurements.bare(45.0, views, dphi, 0.2)
+    for residuals, named in (
+        ([5.0, 5.0, 5.0, -0.1], (0.0, -20.0, 10.0)),
+        ([5.0, 5.0, -0.1, 0.1], (180.0, 10.0, 20.0)),
+        ([0.1, -0.1, 5.0, 5.0], (0.0, 10.0, 20.0)),
+    ):
+        worst, *_ = worst_stretches(m, np.array(residuals))
+        assert worst[1:4] == named
+
+
 def test_the_worst_stretch_comes_first_and_noise_is_not_reported() -> None:
     m = three_sweeps()
     r = bump(m, 4.0)
@@ -109,14 +123,14 @@ def test_a_point_set_aside_does_not_split_a_stretch() -> None:
     [
         (35.0, 40.0, (40, 35)),
         (-35.0, 40.0, (40, -35)),
-        (35.0, 200.0, (20, -35)),
-        (-35.0, 200.0, (20, 35)),
+        (35.0, 200.0, (200, 35)),
+        (-35.0, 200.0, (200, -35)),
     ],
 )
 def test_scattered_points_are_reported_with_their_angles(
     theta_r: float, dphi: float, named: tuple[float, float]
 ) -> None:
-    """In one form: dphi below 180 degrees, theta_r signed in that plane."""
+    """As the table has them: theta_r signed or not, dphi below 180 degrees or not."""
     m = Measurements.bare([10.0, 20.0, 30.0], [15.0, theta_r, 25.0], [70.0, dphi, 110.0], 0.2)
     assert sweeps(m) == []
     (worst,) = worst_stretches(m, np.array([0.1, -9.0, 0.1]))
