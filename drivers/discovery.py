@@ -56,4 +56,4 @@ def cameras() -> list[str]:
     """Return a block of text per camera: formats, sizes, and controls with their ranges."""
     from drivers.v4l2.listing import describe, video_devices
 
-    return [str(describe(device)) for device in video_devices()]
+    return [describe(device) for device in video_devices()]

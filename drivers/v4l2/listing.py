@@ -3,42 +3,11 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 
 from drivers.v4l2 import ioctl
 from instrument.errors import DeviceError
-
-
-@dataclass(frozen=True, slots=True)
-class OfferedFormat:
-    """A pixel format and the sizes available with it, as text."""
-
-    name: str
-    sizes: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class CameraDescription:
-    """Capabilities reported by a camera; `current` is its present image format."""
-
-    device: str
-    capability: ioctl.Capability
-    formats: tuple[OfferedFormat, ...]
-    controls: tuple[ioctl.Control, ...]
-    current: ioctl.Format
-
-    def __str__(self) -> str:
-        """Return one line for the device, one per format and one per control."""
-        c = self.capability
-        lines = [f"  {self.device}: {c.card} ({c.driver}, {c.bus})"]
-        for offered in self.formats:
-            sizes = ", ".join(offered.sizes)
-            lines.append(f"    {offered.name}: {sizes or 'any size'}")
-        for control in self.controls:
-            span = f"{control.minimum} to {control.maximum} in steps of {control.step}"
-            lines.append(f"    {control.name} ({control.kind}): {control.value}; {span}")
-        return "\n".join(lines)
 
 
 def video_devices(root: Path = Path("/dev")) -> list[str]:
@@ -48,11 +17,14 @@ def video_devices(root: Path = Path("/dev")) -> list[str]:
     return by_id or [str(path) for path in sorted(numbered, key=lambda p: int(p.name[5:]))]
 
 
-def describe(device: str) -> CameraDescription:
-    """Read a camera's capabilities. It may be in use: nothing is changed."""
+def describe(device: str) -> str:
+    """Return one line for the device, one per format and one per control.
+
+    The camera may be in use: nothing is changed.
+    """
     try:
         with ioctl.opened(device) as descriptor:
-            return _description(device, descriptor)
+            return "\n".join(_lines(device, descriptor))
     except OSError as error:
         raise DeviceError(
             f"camera {device}: does not answer as a V4L2 capture device "
@@ -61,14 +33,11 @@ def describe(device: str) -> CameraDescription:
         ) from error
 
 
-def _description(device: str, descriptor: int) -> CameraDescription:
-    return CameraDescription(
-        device=device,
-        capability=ioctl.capability(descriptor),
-        formats=tuple(
-            OfferedFormat(name, tuple(ioctl.sizes(descriptor, name)))
-            for name in ioctl.formats(descriptor)
-        ),
-        controls=tuple(ioctl.controls(descriptor)),
-        current=ioctl.current_format(descriptor),
-    )
+def _lines(device: str, descriptor: int) -> Iterator[str]:
+    c = ioctl.capability(descriptor)
+    yield f"  {device}: {c.card} ({c.driver}, {c.bus})"
+    for name in ioctl.formats(descriptor):
+        yield f"    {name}: {', '.join(ioctl.sizes(descriptor, name)) or 'any size'}"
+    for control in ioctl.controls(descriptor):
+        span = f"{control.minimum} to {control.maximum} in steps of {control.step}"
+        yield f"    {control.name} ({control.kind}): {control.value}; {span}"

@@ -92,7 +92,7 @@ class Child:
         """Descriptors and threads of this process."""
         return len(list(Path("/proc/self/fd").iterdir())), threading.active_count()
 
-    def describe(self, device: str) -> listing.CameraDescription:
+    def describe(self, device: str) -> str:
         return listing.describe(device)
 
     def serve_here(self, settings: V4l2Settings, socket: str) -> list[tuple[int, float]]:
