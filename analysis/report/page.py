@@ -14,7 +14,7 @@ from pathlib import Path
 
 from analysis.report import charts
 from analysis.report.data import Candidate, Parameter, PlottedSweep, ReportData, Rows, group_sweeps
-from analysis.report.style import CSS, format_value
+from analysis.report.style import CSS, format_value, html_page
 from instrument.record.reading import Preview
 from instrument.text.atomic_file import write_whole
 
@@ -49,13 +49,7 @@ def report_html(data: ReportData) -> str:
         _pictures(data.previews),
         _facts(data),
     ]
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{_text(data.title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n"
-        + "\n".join(part for part in body if part)
-        + "\n</body>\n</html>\n"
-    )
+    return html_page(_text(data.title), CSS, body)
 
 
 def _text(raw: str) -> str:

@@ -10,7 +10,7 @@ from acquisition.benchmark.output.charts import main_chart, study_chart
 from acquisition.benchmark.result import BenchmarkResult, MapPicture
 from acquisition.benchmark.study import Study
 from acquisition.benchmark.trial import Trial, pareto_front
-from analysis.report.style import CSS
+from analysis.report.style import CSS, html_page
 
 _MORE_CSS = """
 body { max-width: 1100px; }
@@ -38,12 +38,7 @@ def page(result: BenchmarkResult) -> str:
         *(_map(n, picture) for n, picture in enumerate(result.maps, start=1)),
         _machine(result),
     ]
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>gonio bench: what accuracy costs</title>\n<style>{CSS}{_MORE_CSS}</style>\n"
-        "</head>\n<body>\n" + "\n".join(body) + "\n</body>\n</html>\n"
-    )
+    return html_page("gonio bench: what accuracy costs", CSS + _MORE_CSS, body)
 
 
 def _head(result: BenchmarkResult) -> str:
