@@ -8,7 +8,7 @@ from pathlib import Path
 from acquisition.benchmark.effort import QUICK, WHOLE
 from acquisition.benchmark.machine import machine
 from acquisition.benchmark.output.files import empty_folder, write
-from acquisition.benchmark.peers import peers
+from acquisition.benchmark.peers import peer_lines
 from acquisition.benchmark.result import BenchmarkResult, MapPicture
 from acquisition.terminal.console import console, duration_text, out
 
@@ -25,7 +25,7 @@ def run_benchmark(folder: Path, quick: bool, with_maps: bool) -> None:
     effort, begun_s = QUICK if quick else WHOLE, time.monotonic()
     found = tuple(studies(effort, _tell))
     pictures = _maps() if with_maps else ()
-    lines, seconds = tuple(peer.line for peer in peers()), time.monotonic() - begun_s
+    lines, seconds = tuple(peer_lines().values()), time.monotonic() - begun_s
     result = BenchmarkResult(
         effort=effort.name, seconds=seconds, machine=machine(), peers=lines, studies=found,
         maps=pictures,

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache, partial
 from importlib import metadata
 from importlib.util import find_spec
@@ -19,32 +18,6 @@ import numpy as np
 
 from instrument.geometry import Brdf, FloatArray, Geometry
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Peer:
-    """Another program and the task that it is measured at.
-
-    `version` is None if it is missing; `problem` says why an installed one does not work.
-    """
-
-    name: str
-    package: str
-    task: str
-    version: str | None
-    problem: str
-
-    @property
-    def line(self) -> str:
-        """Line of the page on this program."""
-        if self.version is None:
-            return (
-                f"{self.name}: not installed (pip install {self.package}); {self.task} not compared"
-            )
-        if self.problem:
-            return f"{self.name} {self.version}: does not work here, not compared: {self.problem}"
-        return f"{self.name} {self.version}: {self.task}"
-
-
 _PACKAGES_AND_TASKS = {
     "lmfit": ("lmfit", "the fit"),
     "pySCATMECH": ("pySCATMECH", "evaluating a BRDF, one geometry a call"),
@@ -52,20 +25,24 @@ _PACKAGES_AND_TASKS = {
 }
 
 
-def peers() -> tuple[Peer, ...]:
-    """Return all peers, installed or not."""
-    found = []
+def peer_lines() -> dict[str, str]:
+    """Return the page's line on each other program, by its name."""
+    lines = {}
     for name, (package, task) in _PACKAGES_AND_TASKS.items():
         version = _version(package)
         problem = _problem(name) if version else ""
-        found.append(Peer(name=name, package=package, task=task, version=version, problem=problem))
-    return tuple(found)
+        if version is None:
+            text = f": not installed (pip install {package}); {task} not compared"
+        else:
+            text = f" {version}: "
+            text += f"does not work here, not compared: {problem}" if problem else task
+        lines[name] = name + text
+    return lines
 
 
-def installed(name: str) -> Peer | None:
-    """Return the peer of that name, or None if it is not installed or does not work."""
-    usable = (p for p in peers() if p.version is not None and not p.problem)
-    return next((p for p in usable if p.name == name), None)
+def is_usable(name: str) -> bool:
+    """Return True if a program is installed and works."""
+    return _version(_PACKAGES_AND_TASKS[name][0]) is not None and not _problem(name)
 
 
 def _version(package: str) -> str | None:
@@ -123,7 +100,7 @@ def lmfit_minimum(
 
 def lambertian_peers(albedo: float) -> dict[str, Brdf]:
     """Return Lambert's BRDF by the installed peers, by name: geometries and values (N,), 1/sr."""
-    return {name: make(albedo) for name, make in _MAKERS.items() if installed(name) is not None}
+    return {name: make(albedo) for name, make in _MAKERS.items() if is_usable(name)}
 
 
 def _scatmech(albedo: float) -> Brdf:

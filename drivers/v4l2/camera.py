@@ -16,7 +16,7 @@ from drivers.v4l2 import ioctl
 from drivers.v4l2.capture import Traits
 from drivers.v4l2.open_device import CHECK_USB, camera_lost
 from drivers.v4l2.session import EXTRA_FRAMES, Session
-from drivers.v4l2.settings import V4l2Settings
+from drivers.v4l2.settings import BUFFERS, V4l2Settings
 from drivers.v4l2.worker_thread import Heartbeat, Hung, WorkerThread
 from instrument.clock import Clock
 from instrument.closeable import Closeable
@@ -83,7 +83,7 @@ class V4l2Camera(Closeable):
             return []
         limitations = list(traits.notes)
         if not traits.monotonic:
-            dropped = self._settings.buffers + EXTRA_FRAMES
+            dropped = BUFFERS + EXTRA_FRAMES
             limitations.append(
                 f"its time stamps are of another clock: {dropped} frames dropped at each call"
             )

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from drivers.v4l2 import ioctl
-from drivers.v4l2.settings import V4l2Settings
+from drivers.v4l2.settings import BUFFERS, V4l2Settings
 from instrument.errors import CameraLost, DeviceError
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def _set_format(video: VideoCapture, settings: V4l2Settings) -> None:
     video.set(cv2.CAP_PROP_FRAME_HEIGHT, settings.height_px)
     if settings.frames_per_s is not None:
         video.set(cv2.CAP_PROP_FPS, settings.frames_per_s)
-    video.set(cv2.CAP_PROP_BUFFERSIZE, settings.buffers)
+    video.set(cv2.CAP_PROP_BUFFERSIZE, BUFFERS)
 
 
 def _check_format(video: VideoCapture, settings: V4l2Settings, control: int, who: str) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from drivers.v4l2.capture import PATIENCE_S, Capture, Traits
 from drivers.v4l2.frame_filter import FrameFilter
-from drivers.v4l2.settings import STEPS_PER_S, V4l2Settings
+from drivers.v4l2.settings import BUFFERS, STEPS_PER_S, V4l2Settings
 from drivers.v4l2.worker_thread import Heartbeat
 from instrument.clock import Clock
 from instrument.devices import Frame
@@ -51,7 +51,7 @@ class Session:
             self.exposure_s,
             traits.period_s,
             settings.exposure_delay_frames,
-            None if traits.monotonic else settings.buffers + EXTRA_FRAMES,
+            None if traits.monotonic else BUFFERS + EXTRA_FRAMES,
         )
 
     @property

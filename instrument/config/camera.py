@@ -10,7 +10,7 @@ from pydantic import Field
 from instrument.config.section import Finite, Name, NotNegative, Positive, Section
 
 V4L2_EXPOSURE_STEP_S = 1e-4
-_FORMAT_BITS = {"GREY": 8, "YUYV": 8, "Y10": 10, "Y16": 16}
+_BIT_DEPTHS = {"GREY": (8, 8), "YUYV": (8, 8), "Y10": (10, 10), "Y16": (9, 16)}
 
 
 class CameraConfig(Section):
@@ -104,9 +104,9 @@ class V4l2CameraConfig(CameraConfig):
             steps = getattr(self, key) / V4L2_EXPOSURE_STEP_S
             if not 0.5 < steps < 1e15 or abs(steps - round(steps)) > 1e-6:
                 yield key, f"{getattr(self, key):g}; allowed: whole multiples of 0.0001 s"
-        most = _FORMAT_BITS[self.pixel_format]
-        if self.bit_depth > most or (most < 16 and self.bit_depth != most):
-            allowed = f"{most}" if most < 16 else "9 to 16"
+        low, high = _BIT_DEPTHS[self.pixel_format]
+        if not low <= self.bit_depth <= high:
+            allowed = f"{low}" if low == high else f"{low} to {high}"
             yield "bit_depth", f"{self.bit_depth}; allowed for {self.pixel_format}: {allowed}"
 
 

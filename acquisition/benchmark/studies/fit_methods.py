@@ -16,7 +16,7 @@ import numpy as np
 
 from acquisition.benchmark.effort import Effort
 from acquisition.benchmark.number_text import percent, rounded
-from acquisition.benchmark.peers import installed, lmfit_minimum
+from acquisition.benchmark.peers import is_usable, lmfit_minimum
 from acquisition.benchmark.studies.fit_truth import (
     SCENES,
     Optimum,
@@ -125,9 +125,8 @@ METHODS: tuple[Method[Solve], ...] = (
 
 def methods() -> tuple[Method[Solve], ...]:
     """Return all methods that can be measured here."""
-    if installed("lmfit") is None:
-        return METHODS
-    return (*METHODS, Method("another program", "lmfit", lmfit_fit, peer=True, note="leastsq"))
+    lmfit = Method("another program", "lmfit", lmfit_fit, peer=True, note="leastsq")
+    return (*METHODS, lmfit) if is_usable("lmfit") else METHODS
 
 
 def fit_studies(effort: Effort) -> tuple[Study, Study]:
