@@ -151,7 +151,9 @@ def _notes(source: Source, chosen: FitResult) -> list[str]:
     """Remarks on the uncertainties, the model's validity, outliers and the end of the search."""
     m, found = source.measurements, []
     if m.u_random is None:
-        percent = 100 * float(np.mean(chosen.u_total)) / float(np.mean(m.brdf))
+        covariance = chosen.problem.covariance
+        noise = covariance.u_independent if covariance.common.shape[1] else chosen.u_total
+        percent = 100 * float(np.mean(noise)) / float(np.mean(chosen.problem.brdf))
         found.append(
             f"no u is stated: the noise is estimated from the residuals, {percent:.2g} % of the "
             "mean; every u is based on it"

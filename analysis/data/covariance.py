@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 LAMP_LEVEL = "lamp level"
 
 _MAX_DENSE = 100_000  # entries of a dense array; larger ones are mostly zeros, so sparse
-_U_UNKNOWN_LEVEL = 1.0  # relative u of a lamp level of which nothing is known
+_U_UNKNOWN_LEVEL = 0.3  # relative u of a lamp level, once normalised to a model near the data
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,8 +45,9 @@ class FitResult:
     outliers: (N,), points that a robust fit set aside; they do not count in what follows.
     chi2, reduced_chi2: None where no u is stated; reduced_chi2 also without degrees of freedom.
     bic, aicc: chi2 + K ln N and chi2 + 2 K N / (N - K - 1), with N ln(rss / N) for chi2 where no u
-    is stated. rms_relative: rms residual over mean BRDF. averaged: the model was averaged over the
-    rig's acceptance, which is done where that matters. message: why the search ended.
+    is stated. rms_relative: rms residual over mean BRDF; where no u is stated, less shared errors.
+    averaged: the model was averaged over the rig's acceptance, which is done where that matters.
+    message: why the search ended.
     """
 
     model: str
@@ -197,7 +198,8 @@ def _result(
     residual = m.brdf - predicted
     scale = math.sqrt(noise) if m.u_random is None and problem.huber is None else 1.0
     pulls = covariance.pulls(residual)
-    unshared = (residual - covariance.common @ pulls) / (covariance.u_independent * scale)
+    own = residual - covariance.common @ pulls
+    unshared = own / (covariance.u_independent * scale)
     outliers = np.abs(unshared) > OUTLIER_U if problem.huber else np.zeros(m.size, dtype=bool)
     good = ~outliers
     white = covariance.subset(good).whiten(residual[good])
@@ -205,7 +207,7 @@ def _result(
     dof = int(np.sum(good)) - x.size
     stated = m.u_random is not None
     mean = float(np.mean(m.brdf[good]))
-    rms = float(np.sqrt(np.mean(np.square(residual[good]))))
+    rms = float(np.sqrt(np.mean(np.square((residual if stated else own)[good]))))
     found = found._replace(chi2=problem.chi2(x))
     return FitResult(
         model=problem.model.name,

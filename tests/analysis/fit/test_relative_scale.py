@@ -97,3 +97,27 @@ def test_the_unit_of_a_relative_scan_has_no_effect(exponent: float) -> None:
     assert u is not None
     assert abs(other.values["sigma_deg"] - one.values["sigma_deg"]) < 1e-2 * u
     assert other.u["sigma_deg"] == pytest.approx(u, rel=0.05)
+
+
+@pytest.mark.parametrize("stated", [True, False], ids=["u stated", "no u"])
+def test_unknown_levels_of_the_lamp_leave_the_shape_of_each_incidence(stated: bool) -> None:
+    """A level free by its whole value would let any model pass at a chi2 of 1 for each level."""
+    m = noise_free(MODEL.name, TRUTH)
+    levels = np.array([1000.0, 1700.0, 800.0, 900.0])[m.lamp_setting]
+    inside = 0
+    for seed in range(8):
+        noise = 1 + 0.005 * np.random.default_rng([13, seed]).standard_normal(m.size)
+        data = replace(
+            m,
+            brdf=m.brdf * noise * levels,
+            u_random=0.005 * m.brdf * levels if stated else None,
+            relative=True,
+            free_levels=True,
+        )
+        found = fit(MODEL, data)
+        low, high = found.intervals.get("sigma_deg", (0.0, 0.0))
+        u = found.u["sigma_deg"]
+        assert "sigma_deg" not in found.undetermined
+        inside += low <= 30 <= high if u is None else abs(found.values["sigma_deg"] - 30) < 3 * u
+        assert found.rms_relative < 0.01 or stated
+    assert inside >= 7
