@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from analysis.choice.ladder import LADDER
 from analysis.fit.scale_ratios import ratio_names
 from analysis.models import MODELS
 from instrument.config.protocol import Protocol
+
+# Candidates of up to three parameters whose values a protocol without named models is planned for.
+_USUAL = (
+    "lambert",
+    "oren_nayar",
+    "wolff",
+    "lambert+torrance_sparrow",
+    "oren_nayar+torrance_sparrow",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +31,7 @@ class Determinable:
     @classmethod
     def of(cls, protocol: Protocol) -> Determinable:
         """Of a scan without a white tile, no scale can be determined: its radiance is relative."""
-        models = [MODELS[name] for name in protocol.fit.models or LADDER]
+        models = [MODELS[name] for name in protocol.fit.models or _USUAL]
         parameters = {p.name: p for model in models for p in model.parameters}
         ratios = dict.fromkeys(ratio for model in models for ratio in ratio_names(model))
         absolute = protocol.references.white_tile is not None

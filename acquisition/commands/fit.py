@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 from rich import box
 from rich.table import Table
 
 from acquisition.commands.fit_status import no_fit_reported, print_json, require_result
 from acquisition.results.model_check import check_model
 from acquisition.results.sources import Source, Wanted, read_source
-from acquisition.results.summary import (
-    VERDICTS,
-    paper_ratio_note,
-    parameters_of,
-    validity_note,
-    value_text,
-)
+from acquisition.results.summary import VERDICTS, paper_ratio_note, parameters_of, value_text
 from acquisition.terminal.console import out
 from analysis.choice.choice import Choice, choose
 from analysis.choice.fit_json import to_json
@@ -28,6 +20,8 @@ from analysis.data.text_file import parse_number
 from analysis.fit.fit import FitResult
 from instrument.errors import InputError
 from instrument.text.quoting import printable
+
+_MOST_ROWS = 12  # of the table of candidates
 
 
 def fit_source(
@@ -46,9 +40,9 @@ def fit_source(
         if names is None and way == "auto":
             names, way = source.fit.models, source.fit.method
         choice = choose(source.measurements, source.acceptance, names, robust, way)
-    found = to_json(choice)
+    found = to_json(replace(choice, notes=(*source.notes, *choice.notes)))
     if as_json:
-        print_json(_with_notes(found, source))
+        print_json(found)
     else:
         _print(source, choice)
     require_result(found, str(path))
@@ -94,14 +88,8 @@ def parse_u_shared(text: str | None) -> float | None:
     return u
 
 
-def _with_notes(fit: dict[str, Any], source: Source) -> dict[str, Any]:
-    """Content of fit.json with the remarks on the source, if there are any."""
-    notes = [*fit.get("notes", []), *(note._asdict() for note in source.notes)]
-    return fit | {"notes": notes} if notes else fit
-
-
 def _print(source: Source, choice: Choice) -> None:
-    chosen = next((c for c in choice.candidates if c.model == choice.chosen), None)
+    chosen = choice.best
     if chosen is None:
         out.print(f"{choice.verdict}: {choice.reason}", highlight=False)
         return
@@ -110,29 +98,29 @@ def _print(source: Source, choice: Choice) -> None:
     for parameter in parameters_of(chosen):
         parameters.add_row(parameter.name, value_text(parameter))
     out.print(parameters)
-    out.print(_table(choice.candidates, chosen))
-    for note in (
-        *(n.text for n in source.notes),
-        choice.reason,
-        str(choice.symmetry),
-        *_notes(source, chosen),
-    ):
-        out.print(f"- {note}", highlight=False)
+    out.print(_table(choice, chosen))
+    noted = (note.text for note in (*source.notes, *choice.notes))
+    for text in (choice.reason, str(choice.symmetry), paper_ratio_note(chosen), *noted):
+        if text:
+            out.print(f"- {text}", highlight=False)
 
 
-def _table(candidates: Sequence[FitResult], chosen: FitResult) -> Table:
-    """Candidates by rising BIC; K is the number of parameters, ✗ marks no convergence."""
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    table.add_column(
-        "\u00a0\u00a0candidate", overflow="fold"
-    )  # in a narrow terminal this column wraps
+def _table(choice: Choice, chosen: FitResult) -> Table:
+    """The candidates of lowest BIC, and the chosen one; K is the number of parameters."""
+    best_bic = min(c.bic for c in choice.candidates)
+    best_aicc = min(c.aicc for c in choice.candidates)
+    ordered = sorted(choice.candidates, key=lambda c: c.bic)
+    shown = [c for n, c in enumerate(ordered) if n < _MOST_ROWS or c is chosen]
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), caption_justify="left")
+    table.caption = "→ chosen, ✗ does not fit"
+    if len(shown) < len(ordered):
+        table.caption += f"; {len(ordered) - len(shown)} more candidates: see --json"
+    table.add_column("\u00a0\u00a0candidate", overflow="fold")  # wraps in a narrow terminal
     for name in ("K", "rms/mean", "χ²/dof", "ΔBIC", "ΔAICc"):
         table.add_column(name, no_wrap=True)
-    best_bic = min(c.bic for c in candidates)
-    best_aicc = min(c.aicc for c in candidates)
-    for c in sorted(candidates, key=lambda c: c.bic):
+    for c in shown:
         chi2 = "" if c.reduced_chi2 is None else _short(c.reduced_chi2)
-        mark = "→" if c is chosen else "" if c.converged else "✗"
+        mark = "→" if c is chosen else "" if c.model in choice.agreeing else "✗"
         row = (f"{100 * c.rms_relative:.3g} %", chi2, _short(c.bic - best_bic))
         table.add_row(
             f"{mark:\u00a0<1}\u00a0{c.model}", str(c.x.size), *row, _short(c.aicc - best_aicc)
@@ -145,32 +133,3 @@ def _short(number: float) -> str:
     if abs(number) < 10:
         return f"{number:.2f}"
     return f"{number:.0f}" if number < 1e6 else f"{number:.0e}"
-
-
-def _notes(source: Source, chosen: FitResult) -> list[str]:
-    """Remarks on the uncertainties, the model's validity, outliers and the end of the search."""
-    m, found = source.measurements, []
-    if m.u_random is None:
-        covariance = chosen.problem.covariance
-        noise = covariance.u_independent if covariance.common.shape[1] else chosen.u_total
-        percent = 100 * float(np.mean(noise)) / float(np.mean(chosen.problem.brdf))
-        found.append(
-            f"no u is stated: the noise is estimated from the residuals, {percent:.2g} % of the "
-            "mean; every u is based on it"
-        )
-    outside = validity_note(chosen)
-    if outside:
-        found.append(outside)
-    ratio = paper_ratio_note(chosen)
-    if ratio:
-        found.append(ratio)
-    if m.relative:
-        found.append("the values are relative: parameters that only scale them are undetermined")
-    for k in np.flatnonzero(chosen.outliers)[:10]:
-        where = f"theta_i {m.theta_i_deg[k]:g}, theta_r {m.theta_r_deg[k]:g}"
-        found.append(
-            f"outlier set aside: {where}, dphi {m.dphi_deg[k]:g} degrees, "
-            f"residual {chosen.residuals[k]:+.1f} u"
-        )
-    found.append(f"the search ended: {chosen.message}")
-    return found

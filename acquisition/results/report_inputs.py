@@ -73,6 +73,7 @@ def candidates(fitted: Fitted) -> tuple[Candidate, ...]:
             bic=result.bic,
             converged=result.converged,
             chosen=result.model == fitted.choice.chosen,
+            agrees=result.model in fitted.choice.agreeing,
             message=result.message,
             residuals=result.residuals,
             curve=_curve(result),

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from acquisition.results.fitting import measurements
 from acquisition.results.reduction import reduced_run, require_usable
 from acquisition.results.run_folder import load_run_inputs
+from analysis.choice.notes import Note, NoteCode
 from analysis.data.acceptance import Acceptance
 from analysis.data.csv_table import read_table
 from analysis.data.curet import read_curet
@@ -20,13 +20,6 @@ from instrument.errors import AllFlagged, InputError, NoMeasurement, NotDetermin
 from instrument.record.record import FILE_NAME, Record
 
 FORMATS = ("auto", "run", "csv", "curet")
-
-
-class Note(NamedTuple):
-    """Remark on a source: a code for programs, and a sentence."""
-
-    code: str
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +127,7 @@ def _csv(path: Path, wanted: Wanted) -> Source:
 
 def _flagged(flagged: int, points: int) -> tuple[Note, ...]:
     text = f"{flagged} of {points} points are flagged and not fitted"
-    return (Note("flagged", text),) if flagged else ()
+    return (Note(NoteCode.FLAGGED, text),) if flagged else ()
 
 
 def _with_assumptions(source: Source, wanted: Wanted, *, states_shared: bool) -> Source:
@@ -144,18 +137,18 @@ def _with_assumptions(source: Source, wanted: Wanted, *, states_shared: bool) ->
         error = SharedError.common_to_all("--u-shared", wanted.u_shared, m.size)
         source = replace(source, measurements=replace(m, shared=(*m.shared, error)))
         text = f"all values share an error of {100 * wanted.u_shared:g} % (--u-shared)"
-        notes.append(Note("u_shared", text))
+        notes.append(Note(NoteCode.U_SHARED, text))
     elif not states_shared:
         text = (
             "assumed: no error is shared by several values, such as that of a white tile; if one "
             "is, state its relative u, which the uncertainty of the parameters lacks: --u-shared"
         )
-        notes.append(Note("assumed_no_shared_error", text))
+        notes.append(Note(NoteCode.ASSUMED_NO_SHARED_ERROR, text))
     if not any((m.u_theta_i_deg, m.u_theta_r_deg, m.u_dphi_deg)):
-        notes.append(Note("assumed_exact_angles", "assumed: the angles are exact"))
+        notes.append(Note(NoteCode.ASSUMED_EXACT_ANGLES, "assumed: the angles are exact"))
     if source.acceptance is None:
         text = "assumed: lamp, lens and measured patch are small: no value is a mean over angles"
-        notes.append(Note("assumed_small_acceptance", text))
+        notes.append(Note(NoteCode.ASSUMED_SMALL_ACCEPTANCE, text))
     return replace(source, notes=tuple(notes))
 
 
@@ -166,7 +159,7 @@ def _curet(path: Path, wanted: Wanted) -> Source:
         f"sample {wanted.sample}: {used} of {asked} directions up to {wanted.max_theta_deg:g} "
         f"degrees; {found.negative} negative and {found.zero} zero values masked"
     )
-    source = Source(found.measurements, None, (Note("directions", text),))
+    source = Source(found.measurements, None, (Note(NoteCode.DIRECTIONS, text),))
     return _with_assumptions(source, wanted, states_shared=False)
 
 
@@ -176,5 +169,5 @@ def _cut(source: Source, max_theta_deg: float) -> Source:
     if np.all(inside):
         return source
     text = f"{int(np.sum(~inside))} of {m.size} points lie beyond {max_theta_deg:g} degrees"
-    notes = (*source.notes, Note("cut", text))
+    notes = (*source.notes, Note(NoteCode.CUT, text))
     return replace(source, measurements=m.subset(inside), notes=notes)

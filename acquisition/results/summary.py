@@ -6,6 +6,7 @@ import numpy as np
 
 from acquisition.results.fitting import Fitted, u_without
 from acquisition.results.reduction import DARK, NOISE, ROUNDING, Reduced
+from analysis.choice.notes import NoteCode
 from analysis.fit.fit import FitResult
 from analysis.report.data import Parameter
 from analysis.report.style import format_value
@@ -36,9 +37,9 @@ def headline(fitted: Fitted) -> str:
 
 def value_text(parameter: Parameter) -> str:
     """Return a parameter's value with its uncertainty, or its interval if it has no u."""
-    if parameter.u is not None:
+    if parameter.u is not None or parameter.interval is None:
         return format_value(parameter.value, parameter.u, parameter.unit)
-    low, high = parameter.interval or (np.nan, np.nan)
+    low, high = parameter.interval
     return f"not determined, within [{low:.4g}, {high:.4g}] {parameter.unit}".rstrip()
 
 
@@ -100,12 +101,13 @@ def budget(reduced: Reduced, u_brdf: FloatArray) -> Budget:
 
 def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> tuple[str, ...]:
     """Return everything else that the operator should know, one sentence each."""
+    of_fit = () if fitted.choice is None else fitted.choice.notes
     found = (
         "" if loaded.rig.real else "all data are simulated",
         _unfinished_note(record),
         _interruptions_note(record),
         fitted.reason if fitted.choice is not None else "",
-        validity_note(fitted.chosen) if fitted.chosen is not None else "",
+        *(note.text for note in of_fit if note.code != NoteCode.SEARCH_END),
         paper_ratio_note(fitted.chosen) if fitted.chosen is not None else "",
         _hidden_note(record),
         _flag_note(reduced),
@@ -115,18 +117,6 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         "the white tile is assumed to be Lambertian" if reduced.shared_by_tile else "",
     )
     return tuple(note for note in found if note)
-
-
-def validity_note(chosen: FitResult) -> str:
-    """Return the number of points outside the fitted model's range of validity, and the reason."""
-    valid = chosen.validity
-    outside = int(np.sum(~valid.mask))
-    if not outside:
-        return ""
-    return (
-        f"{outside} of {valid.mask.size} points are outside the model's range of validity: "
-        f"{valid.reason}"
-    )
 
 
 def _hidden_note(record: Record) -> str:

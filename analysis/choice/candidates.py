@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,19 +65,32 @@ class Candidates:
             if self.every or form is None or _form_inaccurate(form, m):
                 quick[model.name] = quick_fit(model, m)
         best = _best(quick.values()) if quick else None
+        complete = [f.problem.model.name for f in self.first]
         first = tuple(
-            f if best is None or _ruled_out(f, best, m) else multi_start(f, m, self.robust)
-            for f in quick.values()
+            f
+            if name in complete or best is None or _ruled_out(f, best, m)
+            else multi_start(f, m, self.robust)
+            for name, f in quick.items()
         )
         few = tuple(model.name for model in named if not enough_points(model, m))
         return replace(self, first=first, left_out=(*self.left_out, *few))
 
-    def refined(self, acceptance: Acceptance | None) -> tuple[FitResult, ...]:
-        """Fit each with all uncertainties, linearised about the best first fit."""
+    def refined(
+        self, acceptance: Acceptance | None, already: Container[str] = ()
+    ) -> tuple[FitResult, ...]:
+        """Fit each, but for those `already` fitted, with the uncertainties that are linear."""
         m, best = self.measurements, _best(self.first)
         return tuple(
-            refine(f, m, acceptance, best.brdf, _ruled_out(f, best, m)) for f in self.first
+            refine(f, m, acceptance, best.brdf, _ruled_out(f, best, m), profiles=False)
+            for f in self.first
+            if f.problem.model.name not in already
         )
+
+    def profiled(self, name: str, acceptance: Acceptance | None) -> FitResult:
+        """Fit the candidate of that name with all uncertainties and intervals."""
+        best = _best(self.first)
+        (own,) = (f for f in self.first if f.problem.model.name == name)
+        return refine(own, self.measurements, acceptance, best.brdf)
 
 
 def _best(first: Iterable[FirstFit]) -> FirstFit:

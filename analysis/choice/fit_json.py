@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Container
 from typing import Any
 
 from analysis.choice.choice import Choice
@@ -14,12 +15,15 @@ from instrument.errors import NoMeasurement, NotDetermined
 
 def to_json(choice: Choice) -> dict[str, Any]:
     """Convert a choice for `json.dumps(..., allow_nan=False)`."""
+    u_scale = {} if choice.u_scale is None else {"u_scale": _number(choice.u_scale)}
     return {
         "chosen": choice.chosen,
         "verdict": choice.verdict,
+        **u_scale,
         "reason": choice.reason,
+        "notes": [note.json for note in choice.notes],
         "symmetry": None if choice.symmetry is None else _symmetry(choice.symmetry),
-        "candidates": [_candidate(c) for c in choice.candidates],
+        "candidates": [_candidate(c, choice.agreeing) for c in choice.candidates],
     }
 
 
@@ -29,7 +33,7 @@ def no_fit_json(error: NotDetermined) -> dict[str, Any]:
     return {**found, "verdict": None} if isinstance(error, NoMeasurement) else found
 
 
-def _candidate(result: FitResult) -> dict[str, Any]:
+def _candidate(result: FitResult, agreeing: Container[str]) -> dict[str, Any]:
     return {
         "model": result.model,
         "parameters": {name: _parameter(result, name) for name in result.values},
@@ -38,6 +42,7 @@ def _candidate(result: FitResult) -> dict[str, Any]:
         "bic": _number(result.bic),
         "aicc": _number(result.aicc),
         "converged": result.converged,
+        "agrees": result.model in agreeing,
         "message": result.message,
         "ratios": {name: _ratio(ratio) for name, ratio in result.ratios.items()},
     }

@@ -1,34 +1,51 @@
-"""Candidate models of the automatic choice, in order of complexity from Lambert's law up.
+"""Candidate models of the automatic choice, in rungs by number of parameters.
 
-Methods for the same physics are ordered by cost: of those that the data cannot distinguish, the
-first is taken. LADDER has the papers' models of up to three parameters. Only where none explains
-the data are those of RICH tried, with up to five: gloss with a width of its own or without
-Fresnel's law, and light scattered inside.
+A rung is tried only where no candidate of the rungs below explains the data. Methods for the same
+physics are ordered by cost: of those that the data cannot distinguish, the first is taken. The
+candidates are the papers' models and sums, and, for real materials, gloss without Fresnel's law and
+light scattered inside.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import groupby
 from typing import Literal, get_args
+
+from analysis.models import MODELS
 
 MethodOfFit = Literal["auto", "qualitative", "functional", "exact"]
 """Method for the BRDF of the rough surface; auto: the cheapest that is accurate enough."""
 
-LADDER = (
+CANDIDATES = (
     "lambert",
     "oren_nayar_qualitative",
     "oren_nayar",
     "oren_nayar_exact",
     "wolff",
+    "minnaert",
+    "eon",
+    "torrance_sparrow",
+    "torrance_sparrow_lobe",
+    "ggx",
     "lambert+torrance_sparrow",
     "oren_nayar_qualitative+torrance_sparrow",
     "oren_nayar+torrance_sparrow",
     "oren_nayar_exact+torrance_sparrow",
-)
-
-RICH = (
+    "lambert+torrance_sparrow_lobe",
+    "lambert+ggx",
+    "wolff_oren_nayar",
+    "beckmann_spizzichino",
+    "oren_nayar+torrance_sparrow_lobe",
+    "oren_nayar+ggx",
+    "wolff+torrance_sparrow",
+    "wolff+torrance_sparrow_lobe",
     "wolff+ggx",
+    "lambert+beckmann_spizzichino",
     "minnaert+single_scattering",
+    "unified",
+    "oren_nayar+beckmann_spizzichino",
+    "wolff+beckmann_spizzichino",
     "lambert+ggx+single_scattering",
     "lambert+torrance_sparrow_lobe+single_scattering",
     "oren_nayar+torrance_sparrow+single_scattering",
@@ -47,6 +64,16 @@ _BY_METHOD = {
     "qualitative": "oren_nayar_qualitative", "functional": _FUNCTIONAL, "exact": _EXACT,
 }  # fmt: skip
 METHODS: tuple[MethodOfFit, ...] = get_args(MethodOfFit)
+
+
+def rungs(names: Iterable[str]) -> list[tuple[str, ...]]:
+    """Names grouped by their models' number of parameters, fewest first; else in their order."""
+    ordered = sorted(names, key=_size)
+    return [tuple(rung) for _, rung in groupby(ordered, key=_size)]
+
+
+def _size(name: str) -> int:
+    return len(MODELS[name].parameters)
 
 
 def physics(name: str) -> str:

@@ -26,8 +26,29 @@ def runs_probability(m: Measurements, residuals: FloatArray) -> float:
     both signs, for few points and for alternating residuals: only runs that are too long are
     evidence against a model.
     """
+    counted = _counted(m, residuals)
+    return _probability(*np.sum(counted, axis=0))
+
+
+def least_runs_probability(m: Measurements, residuals: FloatArray) -> float:
+    """Probability of the fewest runs possible with these signs: one for each sign in a sweep.
+
+    `residuals` (N,) in units of u. The test can reject only below this: where it is not small,
+    passing the test is no evidence of noise.
+    """
+    counted = _counted(m, residuals)
+    counted[:, 0] = np.where(counted[:, 2] > 0, 2, counted[:, 0])
+    return _probability(*np.sum(counted, axis=0))
+
+
+def _counted(m: Measurements, residuals: FloatArray) -> FloatArray:
+    """Runs, their expectation and variance for each of S sweeps, (S, 3)."""
     counted = [_runs(residuals[sweep.points]) for sweep in sweeps(m)]
-    runs, expected, variance = np.sum(np.reshape(counted, (-1, 3)), axis=0)
+    return np.reshape(np.array(counted, dtype=np.float64), (-1, 3))
+
+
+def _probability(runs: float, expected: float, variance: float) -> float:
+    """Probability of at most this many runs, by the normal law with a correction for continuity."""
     if variance <= 0:
         return 1.0
     return 0.5 * math.erfc((expected - runs - 0.5) / math.sqrt(2 * variance))

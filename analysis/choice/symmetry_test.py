@@ -7,6 +7,7 @@ surface's diffuse radiance is symmetric about theta_r = 0, a rough surface's is 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -15,18 +16,25 @@ from analysis.data.covariance import Covariance, angle_sensitivity, append_colum
 from analysis.data.measurements import Measurements
 from analysis.data.sweeps import plane_and_view, sweeps
 from analysis.fit.criteria import SIGNIFICANCE, probability
-from instrument.geometry import Brdf, IntArray
+from instrument.geometry import Brdf, FloatArray, IntArray
 
 # Nearer to normal incidence, or to the plane dphi = 90 degrees, any surface is too symmetric.
 _MIN_THETA_I_DEG = 5.0
 _MIN_OFF_PLANE_DEG = 5.0
 _SAME_VIEW_DEG = 0.01
+# Effective number of pairs (Kish 1965: (sum w)^2 / sum w^2, weighted by brightness) from which a
+# verdict is given: with fewer, one lobe or one bad point decides.
+_MIN_EFFECTIVE_PAIRS = 3.0
+# Asymmetry that a test must be able to find before a surface is called smooth, at this many
+# standard deviations. A roughness of 20 degrees causes more than twice as much.
+_NOTABLE_ASYMMETRY, _FOUND_AT = 0.1, 3.0
 
 
 class Symmetry(NamedTuple):
     """Result of the test.
 
-    outcome: "rough" (asymmetric), "smooth" (symmetric) or "not tested" (no pairs of view angles).
+    outcome: "rough" (asymmetric), "smooth" (symmetric), "undecided" (few pairs carry the
+    comparison, or the data are too uncertain to show an asymmetry) or "not tested" (no pairs).
     pairs: number of pairs compared. asymmetry: mean difference of lamp's side and mirror side over
     the mean of their sum. probability: of differences at least as large on a symmetric surface.
     """
@@ -63,11 +71,22 @@ def symmetry(m: Measurements, smooth: Brdf, noise: float) -> Symmetry:
     lamp, mirror = np.array(pairs, dtype=np.int64).T
     difference = m.brdf[lamp] - m.brdf[mirror]
     total = m.brdf[lamp] + m.brdf[mirror]
-    white = _covariance(m, smooth, noise, lamp, mirror).whiten(difference)
+    C = _covariance(m, smooth, noise, lamp, mirror)
+    white = C.whiten(difference)
     chi2 = float(white @ white)
     p = probability(chi2, len(pairs))
-    outcome = "rough" if p < SIGNIFICANCE else "smooth"
+    u = float(np.linalg.norm(C.common.sum(axis=0))) ** 2 + float(np.sum(C.variance))
+    outcome = _outcome(p, total, math.sqrt(u) / float(np.sum(np.abs(total))))
     return Symmetry(outcome, len(pairs), float(np.mean(difference) / np.mean(total)), p)
+
+
+def _outcome(p: float, total: FloatArray, u_asymmetry: float) -> str:
+    """Outcome for pairs of brightness `total` (P,) in 1/sr, and the u of their asymmetry."""
+    if float(np.sum(np.abs(total))) ** 2 < _MIN_EFFECTIVE_PAIRS * float(np.sum(total * total)):
+        return "undecided"
+    if p < SIGNIFICANCE:
+        return "rough"
+    return "smooth" if _FOUND_AT * u_asymmetry < _NOTABLE_ASYMMETRY else "undecided"
 
 
 def _pairs(m: Measurements) -> list[tuple[int, int]]:

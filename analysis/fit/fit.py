@@ -119,28 +119,29 @@ def refine(
     acceptance: Acceptance | None,
     smooth: Brdf,
     ruled_out: bool = False,
+    profiles: bool = True,
 ) -> FitResult:
     """Refit with all uncertainties, shared ones included, and averaged where that matters.
 
     `smooth` is a BRDF near the data, in 1/sr and of the geometry's shape. A `ruled_out` model, far
-    worse than another, is neither averaged nor profiled: the interval of a parameter without u is
-    then its whole domain.
+    worse than another, is neither averaged nor profiled. Without `profiles` the interval of a
+    parameter without u is its whole domain.
     """
     if measurements.u_random is None:
         covariance = _estimated_covariance(first, measurements, ruled_out)
         found = _solve(first, measurements, None if ruled_out else acceptance, covariance)
-        return _result(measurements, found, covariance, ruled_out)
+        return _result(measurements, found, covariance, profiles and not ruled_out)
     covariance = full_covariance(measurements, smooth, first.brdf)
     dof = max(measurements.size - first.solution.x.size, 1)
     wider = replace(covariance, variance=covariance.variance * max(1, first.solution.chi2 / dof))
     if ruled_out:
         problem = replace(first.problem, covariance=wider)
         unchanged = AveragedFit(problem, first.solution, averaged=False, converged=True)
-        return _result(measurements, unchanged, covariance, True)
+        return _result(measurements, unchanged, covariance, False)
     found = _solve(first, measurements, acceptance, covariance)
     if probability(found.solution.chi2, dof) < SIGNIFICANCE:
         found = _solve(first, measurements, acceptance, wider)
-    return _result(measurements, found, covariance, False)
+    return _result(measurements, found, covariance, profiles)
 
 
 def _estimated_covariance(first: FirstFit, m: Measurements, ruled_out: bool) -> Covariance:
@@ -186,14 +187,14 @@ def _solve(
 
 
 def _result(
-    m: Measurements, fitted: AveragedFit, covariance: Covariance, ruled_out: bool
+    m: Measurements, fitted: AveragedFit, covariance: Covariance, profiles: bool
 ) -> FitResult:
     problem, found = replace(fitted.problem, covariance=covariance), fitted.solution
     x = found.x
     noise = noise_variance(m, fitted.problem, found)
     unscaled = unscaled_parameters(problem.model) if m.relative else frozenset[str]()
-    known = uncertainty(fitted.problem, found, noise, unscaled, profiles=not ruled_out)
-    ratios = scale_ratios(fitted.problem, found, noise, profiles=not ruled_out)
+    known = uncertainty(fitted.problem, found, noise, unscaled, profiles)
+    ratios = scale_ratios(fitted.problem, found, noise, profiles)
     predicted = problem.predict(x)
     residual = m.brdf - predicted
     scale = math.sqrt(noise) if m.u_random is None and problem.huber is None else 1.0

@@ -30,7 +30,7 @@ _COLUMNS = (
 class Parameter:
     """A fitted parameter; `u` is None where the data do not determine it.
 
-    `interval` is then its 95 % interval, in the same unit.
+    `interval` is then its 95 % interval, in the same unit; None for a model that is not chosen.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Candidate:
 
     residuals: (measured - model - errors that points share) / u of the points in the fit, in their
         order.
-    curve: BRDF of the fitted model.
+    curve: BRDF of the fitted model. agrees: the model agrees with the data.
     """
 
     name: str
@@ -56,6 +56,7 @@ class Candidate:
     bic: float | None
     converged: bool
     chosen: bool
+    agrees: bool = True
     message: str = ""
     residuals: FloatArray | None = None
     curve: Curve | None = None

@@ -217,7 +217,8 @@ def _candidates(data: ReportData) -> str:
         f'<h2 id="candidates">Models compared</h2>\n{table}\n'
         '<p class="soft">Residual: relative to the mean. Reduced χ² near 1: the model agrees with '
         "the data within their uncertainty. ΔBIC: difference from the lowest BIC, which includes a "
-        "penalty for each parameter. Brackets: 95 % interval.</p>"
+        "penalty for each parameter. Brackets: 95 % interval. Models that are not chosen are shown "
+        "with the values that fit best, and with u where they agree with the data.</p>"
     )
 
 
@@ -228,6 +229,8 @@ def _candidate(candidate: Candidate, best_bic: float | None, tag: str) -> str:
     note = f'<br><span class="tag">{tag}</span>' if candidate.chosen else ""
     if not candidate.converged:
         note += f'<br><span class="soft">did not converge: {_text(candidate.message)}</span>'
+    elif not candidate.agrees:
+        note += '<br><span class="soft">does not fit</span>'
     parameters = "".join(
         f'<span class="parameter"><span class="name">{_text(p.name)}</span> {_value_of(p)}</span>'
         for p in candidate.parameters

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.choice.ladder import LADDER, RICH
+from analysis.choice.ladder import CANDIDATES
 from analysis.models import MODELS
 from instrument.geometry import FloatArray
 from tests.support.command import gonio_here as gonio
@@ -44,7 +44,7 @@ def some_models(rng: np.random.Generator) -> list[str]:
     """Candidates from all models and sums of the ladder, or the automatic choice."""
     if rng.random() < 0.2:
         return []
-    names = sorted({*MODELS, *LADDER, *RICH})
+    names = sorted({*MODELS, *CANDIDATES})
     return ["--models", ",".join(rng.choice(names, rng.integers(1, 3), replace=False))]
 
 

@@ -42,7 +42,7 @@ def test_the_exact_model_is_fitted_only_where_the_form_is_too_far_off() -> None:
     ],
 )
 def test_a_method_given_by_name_is_the_only_one(method: str, own: str) -> None:
-    found = choose(oblique(0.5), method=method)
+    found = choose(oblique(0.05), method=method)
     rough = {term for c in found.candidates for term in c.model.split("+")}
     assert rough & {*FORMS, "oren_nayar_exact"} == {own}
 

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.choice.choice import choose
+from analysis.choice.choice import Choice, choose
 from analysis.choice.fit_json import to_json
+from analysis.choice.notes import NoteCode
 from analysis.data.acceptance import Acceptance
 from analysis.data.curet import read_curet
 from analysis.data.measurements import Measurements
@@ -21,6 +22,11 @@ from tests.support.paths import ROOT
 
 GLOSS = "oren_nayar+torrance_sparrow"
 FEW = ("lambert", "oren_nayar", "lambert+torrance_sparrow", GLOSS)  # no other model fits better
+
+
+def note(choice: Choice, code: NoteCode) -> str:
+    """Text of the notes with that code."""
+    return "; ".join(n.text for n in choice.notes if n.code == code)
 
 
 def seeds(slow: bool) -> range:
@@ -120,8 +126,10 @@ def test_few_points() -> None:
     two = Measurements.bare(30, [0, 20], 0, 0.2, 1e-3)
     found = choose(two)
     assert found.chosen == "lambert"
-    assert "left out for lack of points" in found.reason
     assert max(len(c.values) for c in found.candidates) == 2
+    one = choose(two.subset(np.array([True, False])))
+    assert one.verdict == "not identifiable"
+    assert "left out for lack of points: oren" in note(one, NoteCode.FEW_POINTS)
     with pytest.raises(NotDetermined, match="too few to fit any"):
         choose(two, models=[GLOSS])
 

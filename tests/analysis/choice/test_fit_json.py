@@ -6,7 +6,7 @@ import json
 
 from analysis.choice.choice import choose
 from analysis.choice.fit_json import to_json
-from analysis.choice.ladder import LADDER
+from analysis.choice.ladder import CANDIDATES
 from tests.support.analysis.seeded_scan import scan
 
 
@@ -14,16 +14,19 @@ def test_the_keys_are_as_documented() -> None:
     found = choose(scan("lambert", 1, albedo=0.8))
     written = to_json(found)
     assert json.loads(json.dumps(written, allow_nan=False)) == written
-    assert list(written) == ["chosen", "verdict", "reason", "symmetry", "candidates"]
+    assert list(written) == [
+        "chosen", "verdict", "reason", "notes", "symmetry", "candidates",
+    ]  # fmt: skip
     assert written["symmetry"]["says"] == "smooth"
-    assert {c["model"] for c in written["candidates"]} <= set(LADDER)
+    assert {c["model"] for c in written["candidates"]} <= set(CANDIDATES)
     for candidate in written["candidates"]:
         assert list(candidate) == [
             "model", "parameters", "rms_relative", "reduced_chi2", "bic", "aicc", "converged",
-            "message", "ratios",
+            "agrees", "message", "ratios",
         ]  # fmt: skip
         for entry in candidate["parameters"].values():
-            assert set(entry) == ({"value", "u"} if entry["u"] else {"value", "u", "interval"})
+            interval = candidate["model"] == written["chosen"] and entry["u"] is None
+            assert set(entry) == ({"value", "u", "interval"} if interval else {"value", "u"})
 
 
 def test_ratios_of_scales_have_a_value_and_u() -> None:

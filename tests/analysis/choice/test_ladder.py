@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.choice.ladder import LADDER, METHODS, RICH, functional_form, physics, with_method
+from analysis.choice.ladder import CANDIDATES, METHODS, functional_form, physics, rungs, with_method
 from analysis.models import MODELS
 
 
-def test_candidates_are_known_models_of_few_parameters_in_rising_order() -> None:
-    for names, most in ((LADDER, 3), (RICH, 5)):
-        assert max(len(MODELS[name].parameters) for name in names) == most
-    first = [next(n for n, name in enumerate(LADDER) if physics(name) == p) for p in
-             dict.fromkeys(map(physics, LADDER))]  # fmt: skip
-    sizes = [len(MODELS[LADDER[n]].parameters) for n in first]
-    assert sizes[0] == 1
-    assert sizes == sorted(sizes)
+def test_rungs_have_one_number_of_parameters_and_rise() -> None:
+    found = rungs(CANDIDATES)
+    sizes = [{len(MODELS[name].parameters) for name in rung} for rung in found]
+    assert sizes == [{1}, {2}, {3}, {4}, {5}]
+    assert sorted(name for rung in found for name in rung) == sorted(CANDIDATES)
+    assert rungs(["wolff", "lambert", "eon"]) == [("lambert",), ("wolff", "eon")]
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_one_method_for_the_rough_surface_leaves_each_physics_once(method: str) -> None:
-    names = with_method(LADDER, method)
-    assert set(map(physics, names)) == set(map(physics, LADDER))
+    names = with_method(CANDIDATES, method)
+    assert set(map(physics, names)) == set(map(physics, CANDIDATES))
     assert (len(names) == len(set(map(physics, names)))) == (method != "auto")
 
 

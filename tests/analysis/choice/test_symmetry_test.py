@@ -166,4 +166,27 @@ def test_the_probability_is_that_of_chi2() -> None:
     found = symmetry(m, lambda g: np.full(g.shape, 0.2), 0.0)
     assert found.probability == pytest.approx(0.0455, abs=1e-4)
     assert found.probability > SIGNIFICANCE
-    assert found.outcome == "smooth"
+    assert found.outcome == "undecided"  # one pair
+
+
+def test_no_verdict_where_one_pair_carries_the_comparison() -> None:
+    """A peak a thousand times as bright as the other pairs: its points alone would decide."""
+    view = np.arange(5.0, 80.0, 5.0)
+    both = np.concatenate([view, -view])
+    value = np.where(np.abs(np.abs(both) - 45) < 1, 100.0, 0.1)
+    lamp = both > 0
+    m = Measurements.bare(45.0, both, 0.0, np.where(lamp, 2.4 * value, value), 0.001 * value)
+    found = symmetry(m, lambda g: np.full(g.shape, 0.1), 0.0)
+    assert found.pairs == 15
+    assert found.outcome == "undecided"
+    assert found.asymmetry > 0.4
+
+
+@pytest.mark.parametrize(("noise", "outcome"), [(0.002, "smooth"), (0.2, "undecided")])
+def test_smooth_is_said_only_where_an_asymmetry_would_have_been_found(
+    noise: float, outcome: str
+) -> None:
+    m = dense("lambert", {"albedo": 0.8}, 2, u_relative=0.002)
+    bare = Measurements.bare(m.theta_i_deg, m.theta_r_deg, m.dphi_deg, m.brdf)
+    found = symmetry(bare, brdf_of("lambert", {"albedo": 0.8}), noise)
+    assert found.outcome == outcome

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from analysis.choice.choice import choose
-from analysis.choice.ladder import LADDER, physics
+from analysis.choice.ladder import CANDIDATES, physics
 from analysis.data.covariance import independent_covariance
 from analysis.data.measurements import Measurements
 from analysis.fit.fit import FitResult, fit
@@ -196,7 +196,7 @@ def noise_for(simpler: str, right: str, truth: Mapping[str, float], noncentralit
     """Relative u at which the part that no method for `simpler` can follow has this lambda."""
     f = MODELS[right].brdf(GEOMETRY, **truth)
     m = Measurements.bare(THETA_I, THETA_R, 0.0, f, 0.01 * f)
-    methods = [name for name in LADDER if physics(name) == physics(simpler)]
+    methods = [name for name in CANDIDATES if physics(name) == physics(simpler)]
     left = min(fit(MODELS[name], m).chi2 or 0.0 for name in methods)
     return 0.01 * math.sqrt(left / noncentrality)
 

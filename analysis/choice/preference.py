@@ -1,0 +1,73 @@
+"""Preference among fitted candidates: the simplest on which no larger one improves enough."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from analysis.choice.cross_validation import folds, held_out_error
+from analysis.choice.ladder import SAME_PREDICTION, physics
+from analysis.data.measurements import Measurements
+from analysis.fit.criteria import SIGNIFICANCE, probability
+from analysis.fit.fit import FitResult
+
+# Kass and Raftery, "Bayes Factors", 1995: a difference of BIC up to 2 is "not worth more than a
+# bare mention"; one above 6 is "strong" evidence. Further parameters need it: many models that have
+# some are tried.
+TIE_BIC, STRONG_BIC = 2.0, 6.0
+# Ratio of chi2 up to which a cheaper method with the same predictions is preferred.
+SAME_CHI2 = 2.0
+
+
+def simplest(converged: Iterable[FitResult], measurements: Measurements) -> FitResult:
+    """The simplest candidate on which no larger or costlier one improves enough."""
+    current, *larger = sorted(converged, key=lambda c: c.x.size)  # stable: the ladder's order
+    best = min((current, *larger), key=lambda c: c.bic)
+    left_out = folds(measurements) if larger else []
+    scores: dict[str, float] = {}
+
+    def score(candidate: FitResult) -> float:
+        if candidate.model not in scores:
+            scores[candidate.model] = held_out_error(
+                measurements, candidate.problem, candidate.x, left_out
+            )
+        return scores[candidate.model]
+
+    for candidate in larger:
+        evidence = _bic_difference(current, candidate, best, measurements.size)
+        needed = STRONG_BIC if candidate.x.size > current.x.size else TIE_BIC
+        if evidence <= needed or _equivalent(current, candidate):
+            continue
+        if not left_out or score(candidate) < score(current):
+            current = candidate
+    return current
+
+
+def _bic_difference(candidate: FitResult, other: FitResult, best: FitResult, points: int) -> float:
+    """BIC of a candidate minus that of another, with the misfit of the best counted as noise.
+
+    Where even the best model does not agree within the stated u, the unknown error is no evidence
+    for any model: chi2 is scaled by the best one's reduced chi2 (Birge 1932).
+    """
+    if candidate.chi2 is None or other.chi2 is None:
+        return candidate.bic - other.bic
+    more = candidate.x.size - other.x.size
+    loss = candidate.bic - other.bic - more * math.log(points)
+    return loss / max(1.0, best.reduced_chi2 or 1.0) + more * math.log(points)
+
+
+def _equivalent(cheaper: FitResult, other: FitResult) -> bool:
+    """True for methods of one physics with the same predictions within u/3 and a similar chi2."""
+    if physics(cheaper.model) != physics(other.model):
+        return False
+    if np.any(np.abs(cheaper.predicted - other.predicted) >= SAME_PREDICTION * other.u_total):
+        return False
+    if cheaper.chi2 is None or other.chi2 is None:
+        return True
+    return cheaper.chi2 <= SAME_CHI2 * other.chi2 or _probability(cheaper) > SIGNIFICANCE
+
+
+def _probability(result: FitResult) -> float:
+    return 1.0 if result.chi2 is None else probability(result.chi2, result.dof)
