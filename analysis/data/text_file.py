@@ -15,7 +15,7 @@ from instrument.errors import InputError
 from instrument.text.atomic_file import read_file
 from instrument.text.quoting import printable, shown
 
-MAX_BYTES = 64 * 1024**2  # about 400 000 rows of a run's measurements.csv
+MAX_BYTES = 64 * 1024**2  # about 150 000 rows of a run's measurements.csv
 MAX_LINES = 2_000_000
 MAX_LINE = 1024**2  # characters; a thousand columns need about 20 000
 MAX_REPORTED = 20

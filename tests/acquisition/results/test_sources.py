@@ -14,6 +14,7 @@ from acquisition.results.run_folder import load_run_inputs, run_meta, write_run_
 from acquisition.results.sources import Wanted, read_source
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded, load_protocol
+from instrument.errors import AllFlagged
 from instrument.record.record import Record
 from tests.support.scans import changed, small_demo
 
@@ -54,3 +55,10 @@ def test_a_run_is_fitted_with_the_lamp_s_jumps_taken_out(resumed_with_a_darker_l
     with Record.open(folder) as record:
         reduced = reduced_run(record, load_run_inputs(record))
     assert source.measurements.brdf.tolist() == reduced.brdf[reduced.valid].tolist()
+
+
+def test_a_table_of_flagged_points_alone_has_nothing_to_fit(tmp_path: Path) -> None:
+    path = tmp_path / "dark.csv"
+    path.write_text("theta_i_deg,theta_r_deg,dphi_deg,brdf,flags\n30,0,0,,no signal\n")
+    with pytest.raises(AllFlagged, match="all 1 points are flagged"):
+        read_source(path, Wanted())
