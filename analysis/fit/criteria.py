@@ -82,8 +82,9 @@ def noise_variance(m: Measurements, problem: Problem, solution: Minimum) -> floa
     spare = m.size - solution.x.size
     known = m.u_random is not None or problem.covariance.common.shape[1] > 0
     if problem.huber is not None and spare > 0:
-        r = problem.residual(solution.x)
-        return _robust_variance(r, problem.huber, None if known else spare)
+        least = variance_floor(problem) / float(np.mean(problem.covariance.variance))
+        found = problem.residual(solution.x)
+        return max(_robust_variance(found, problem.huber, None if known else spare), least)
     if known:
         return 1.0
     return max(solution.chi2 / spare, variance_floor(problem))

@@ -42,7 +42,8 @@ class FitResult:
     where no u is stated. residuals: (N,), measured minus predicted, less the most likely values of
     the errors that points share, in units of the independent part of u. pulls: those most likely
     values by name, in units of their own u: above 2 or 3 one is suspect.
-    outliers: (N,), points that a robust fit set aside; they do not count in what follows.
+    outliers: (N,), points that a robust fit set aside, fewer than half; they do not count in what
+    follows.
     chi2, reduced_chi2: None where no u is stated; reduced_chi2 also without degrees of freedom.
     bic, aicc: chi2 + K ln N and chi2 + 2 K N / (N - K - 1), with N ln(rss / N) for chi2 where no u
     is stated. rms_relative: rms residual over mean BRDF; where no u is stated, less shared errors.
@@ -201,7 +202,7 @@ def _result(
     pulls = covariance.pulls(residual)
     own = residual - covariance.common @ pulls
     unshared = own / (covariance.u_independent * scale)
-    outliers = np.abs(unshared) > OUTLIER_U if problem.huber else np.zeros(m.size, dtype=bool)
+    outliers = _outliers(unshared) if problem.huber else np.zeros(m.size, dtype=bool)
     good = ~outliers
     white = covariance.subset(good).whiten(residual[good])
     chi2 = float(white @ white)
@@ -235,3 +236,9 @@ def _result(
         converged=found.converged and fitted.converged,
         message=found.message if fitted.converged else NOT_CONVERGED,
     )
+
+
+def _outliers(residuals: FloatArray) -> BoolArray:
+    """Mask (N,) of residuals, in units of u, to set aside; a majority is a misfit of the model."""
+    found = np.abs(residuals) > OUTLIER_U
+    return found & (2 * np.count_nonzero(found) < found.size)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from scipy.stats import chi2
 
 from analysis.choice.choice import choose
 from analysis.data.measurements import Measurements
-from analysis.fit.criteria import probability
+from analysis.fit.criteria import LEAST_NOISE, probability
 from analysis.fit.fit import fit
 from analysis.models import MODELS
 from tests.support.analysis.seeded_scan import scan
@@ -38,3 +39,11 @@ def test_the_probability_of_chi2_is_the_upper_tail() -> None:
             expected = float(chi2.sf(value, dof))
             assert probability(value, dof) == pytest.approx(expected, rel=1e-9, abs=1e-300)
     assert probability(12.0, 0) == 1.0  # nothing left to test
+
+
+@pytest.mark.parametrize("robust", [False, True])
+def test_values_without_any_noise_have_the_u_of_the_least_noise(robust: bool) -> None:
+    m = Measurements.bare(30.0, np.arange(-60.0, 61.0, 10.0), 0.0, 0.2)
+    found = fit(MODELS["lambert"], m, robust=robust)
+    expected = LEAST_NOISE * found.values["albedo"] / math.sqrt(m.size)
+    assert found.u["albedo"] == pytest.approx(expected, rel=0.1)

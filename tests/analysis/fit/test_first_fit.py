@@ -152,3 +152,15 @@ def test_a_robust_fit_of_good_points_is_nearly_as_precise(stated: bool) -> None:
             apart.append((robust.values[name] - plain.values[name]) / u)
         assert robust.outliers.sum() <= 1
     assert np.abs(apart).max() < 1.0
+
+
+@pytest.mark.parametrize("u", [1e-4, None])
+def test_a_robust_fit_sets_no_majority_aside(u: float | None) -> None:
+    """Where most points are off, the model is wrong, and the points are not."""
+    views = np.arange(-60.0, 61.0, 10.0)
+    m = Measurements.bare(30.0, views, 0.0, 0.2 + 0.1 * np.sin(views), u)
+    found = fit(MODELS["lambert"], m, robust=True)
+    assert np.count_nonzero(found.outliers) < m.size / 2
+    if u is not None:
+        assert not found.outliers.any()
+        assert choose(m, models=["lambert"], robust=True).verdict == "none adequate"
