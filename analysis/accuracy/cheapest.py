@@ -4,8 +4,8 @@ What to use when: `cheapest` before work that evaluates a model often (a fit, a 
 to learn which method of `analysis.accuracy.method` keeps a tolerance in that scene. The search
 takes, for a rough surface on a core of 2 GHz, 5 to 12 ms up to 2000 geometries and 15 to 30 ms for
 20 000 where the bounds settle the matter, half as much again for ranges; 20 to 115 ms where
-doubtful geometries have to be integrated. The integral itself takes 0.1 ms a geometry, so the
-search is worth it where the answer saves more than a hundred or two of them.
+doubtful geometries have to be integrated. The integral itself takes 20 us a geometry, so the
+search is worth it where the answer saves more than five hundred to a thousand of them.
 
 Algorithm: methods are tried by rising cost. Each has a bound on its error over the whole range in
 each geometry. A few of the worst geometries are checked first, a form against the table and then

@@ -61,9 +61,9 @@ ROUGH_SURFACE = MethodFamily(
         _form("qualitative", "oren_nayar_qualitative", oren_nayar_qualitative_brdf, 200, 0.45),
         _form("functional", "oren_nayar", oren_nayar_brdf, 500, 1.0),
         Method("table", tabulated_brdf, partial(map_bound, "table"), Cost(3200, 8.5)),
-        Method("coarse", _rule(COARSE), partial(map_bound, "coarse"), Cost(30e3, 700)),
-        Method("exact", _rule(RULE), _rule_error, Cost(30e3, 1100)),
-        Method("fine", _rule(FINE), _fine_error, Cost(30e3, 3500)),
+        Method("coarse", _rule(COARSE), partial(map_bound, "coarse"), Cost(16e3, 130)),
+        Method("exact", _rule(RULE), _rule_error, Cost(16e3, 220)),
+        Method("fine", _rule(FINE), _fine_error, Cost(18e3, 680)),
     ),
 )
 """From Lambert's law to the V-cavity integral: the forms (36) and (33) + (34) of 1995, the table

@@ -10,9 +10,9 @@ theta_a, so that a new sigma or albedo is only a new weighting; the latest profi
 The slopes are divided at every kink: 90 - theta_i and 90 - theta_r, where shadowing and masking set
 in, and the two slopes at which a critical azimuth of the lamp meets one of the camera. Within a
 piece the nodes are spaced in e-folds of the slope (narrow and wide Gaussians then need the same
-number) and clustered at the ends, where the radiance has half-integer powers: Gauss-Legendre
-converges exponentially. Below the first kink the radiance is 1 + tan^2(theta_a) times a constant,
-and its mean comes from a table for each sigma.
+number) and clustered at its start, where shadowing and masking set in with half-integer powers:
+Gauss-Legendre converges exponentially. Below the first kink the radiance is 1 + tan^2(theta_a)
+times a constant, and its mean comes from a table for each sigma.
 
 Source: M. Oren, S. K. Nayar, "Generalization of the Lambertian Model and Implications for Machine
 Vision", International Journal of Computer Vision 14 (1995), section 4.3.
@@ -33,16 +33,16 @@ import numpy as np
 from analysis.models.base import Model, Validity
 from analysis.models.lambert import ALBEDO
 from analysis.models.rough.oren_nayar_forms import SIGMA_DEG
-from analysis.models.rough.v_cavity import isotropic_single_slope
+from analysis.models.rough.single_slope import DirectionPairs, mean_over_azimuths
 from analysis.models.specular.torrance_sparrow import gaussian_normalisation, mean_square_slope
 from analysis.models.validity import both_graze, valid_except
 from instrument.geometry import FloatArray, Geometry, IntArray
 
 
 class Rule(NamedTuple):
-    """Numbers of nodes: `slopes` per piece, `per_e` more per e-fold of slope, `azimuths` per piece.
+    """Numbers of nodes: `slopes` per piece, `per_e` more per e-fold of slope, `azimuths` per arc.
 
-    A shorter piece uses fewer of the `slopes`.
+    A shorter piece uses fewer of the `slopes`; for the arcs see `single_slope`.
     """
 
     slopes: int
@@ -50,11 +50,11 @@ class Rule(NamedTuple):
     azimuths: int
 
 
-RULE = Rule(9, 6, 10)
+RULE = Rule(5, 6, 10)
 """1e-6 relative."""
-COARSE = Rule(6, 4, 7)
+COARSE = Rule(3, 5, 6)
 """1e-4 relative."""
-FINE = Rule(18, 11, 28)
+FINE = Rule(8, 10, 36)
 """1e-8 relative."""
 
 CACHE_BYTES = 256 * 2**20
@@ -78,9 +78,10 @@ def oren_nayar_exact_brdf(
     camera both graze the surface and are not opposite to each other.
 
     Accuracy, relative, for sigma 0.5 to 60 degrees, theta up to 85 degrees, all dphi: 1e-6. The
-    first evaluation of a geometry takes 0.1 ms (one core of 2 GHz), a new sigma or albedo on it
-    0.6 us. With `COARSE` 1e-4: 0.06 ms and 0.45 us; with `FINE` 1e-8: 0.36 ms and 1.2 us. The
-    functional form takes 0.08 us. Nearer to grazing 1e-6 becomes 1e-4 (88 degrees) and 2e-4 (90).
+    first evaluation of a geometry takes 22 us (one core of 2 GHz), a new sigma or albedo on it
+    0.6 us. With `COARSE` 1e-4: 14 us and 0.45 us; with `FINE` 1e-8: 75 us and 1 us. The functional
+    form takes 0.08 us. Nearer to grazing 1e-6 becomes 4e-6 (89.9 degrees) and, between there and
+    90, 6e-5; at 90 the value is the limit.
 
     In the plane of incidence the surface itself has a cusp where the camera meets the lamp.
     """
@@ -165,22 +166,39 @@ def profile(larger: FloatArray, smaller: FloatArray, dphi: FloatArray, rule: Rul
     The radiance over E0 cos(theta_i) is reciprocal, so the order does not matter.
     """
     edges = slope_kinks(larger, smaller, dphi)
-    start, end = edges[:-1].ravel(), edges[1:].ravel()
+    drawn = list(_drawn(edges, rule))
+    at = np.concatenate([np.tile(own, theta.shape[0]) for theta, _, own in drawn])
+    slopes = np.concatenate([theta.ravel() for theta, _, _ in drawn])
+    pairs = DirectionPairs.of(larger, smaller, dphi)
+    parts = mean_over_azimuths(pairs, at, slopes, rule.azimuths)
+    ends = np.cumsum([theta.size for theta, _, _ in drawn])[:-1]
+    split = (np.split(part, ends) for part in parts)
+    nodes = [
+        Nodes(theta * theta, weight * direct.reshape(shape), weight * twice.reshape(shape), own)
+        for (theta, weight, own), direct, twice in zip(drawn, *split, strict=True)
+        for shape in [theta.shape]
+    ]
+    return Profile(edges[0], pairs.tan_1 * pairs.tan_2 * pairs.cos_dphi, tuple(nodes))
+
+
+def _drawn(edges: FloatArray, rule: Rule) -> Iterator[tuple[FloatArray, FloatArray, IntArray]]:
+    """Nodes theta_a and weights times sin(theta_a), both (node, piece), with each piece's geometry.
+
+    Pieces with the same number of nodes come together. `edges` as of `slope_kinks`.
+    """
+    start, end = edges[:-1], edges[1:]
     width = np.log((end + _OFFSET) / (start + _OFFSET))
-    # The error of a piece is proportional to its width: one narrower by 1e-6 needs no nodes.
-    share = np.clip(1 + np.log(np.maximum(width, 1e-9)) / math.log(1e6), 0.1, 1.0)
-    count = 2 * np.ceil((rule.slopes * share + rule.per_e * width) / 2).astype(np.intp)
+    e_folds = width.copy()  # tan^2 of the first piece has its pole at 90 degrees, just beyond it
+    beyond = np.pi / 2 + _OFFSET
+    e_folds[0] += np.log((beyond - start[0]) / (beyond - end[0]))
+    # The error of a piece is proportional to its width: one narrower by 1e-8 needs no nodes.
+    share = np.clip(1 + np.log(np.maximum(width, 1e-9)) / math.log(1e8), 0.1, 1.0)
+    count = np.ceil(rule.slopes * share + rule.per_e * e_folds).astype(np.intp)
     count[end - start < 1e-12] = 0
-    nodes = []
     for number in np.unique(count[count > 0]):
-        piece = np.flatnonzero(count == number)
-        at = piece % larger.size
-        theta, weight = _clustered(start[piece], width[piece], int(number))
-        part = isotropic_single_slope(larger[at], smaller[at], dphi[at], theta, rule.azimuths)
-        weight *= np.sin(theta)
-        nodes.append(Nodes(theta * theta, weight * part.direct, weight * part.twice, at))
-    bend = np.tan(larger) * np.tan(smaller) * np.cos(dphi)
-    return Profile(edges[0], bend, tuple(nodes))
+        piece, geometry = np.nonzero(count == number)
+        theta, weight = _clustered(start[piece, geometry], width[piece, geometry], int(number))
+        yield theta, weight * np.sin(theta), geometry
 
 
 def slope_kinks(larger: FloatArray, smaller: FloatArray, dphi: FloatArray) -> FloatArray:
@@ -203,12 +221,12 @@ def slope_kinks(larger: FloatArray, smaller: FloatArray, dphi: FloatArray) -> Fl
 def _clustered(start: FloatArray, width: FloatArray, number: int) -> tuple[FloatArray, FloatArray]:
     """Nodes theta_a and weights on pieces that span `width` e-folds: shape (number, piece).
 
-    t^2 (3 - 2 t) clusters the nodes at both ends: a half-integer power there becomes an integer
+    t^2 (5 - t) / 4 clusters the nodes at the start: a half-integer power there becomes an integer
     one.
     """
     t, w = (array[:, None] for array in _gauss(number))
-    shifted = (start + _OFFSET) * np.exp(width * (t * t * (3 - 2 * t)))
-    weight = shifted * width * (6 * t * (1 - t) * w)
+    shifted = (start + _OFFSET) * np.exp(width * (t * t * (5 - t) / 4))
+    weight = shifted * width * (t * (10 - 3 * t) / 4 * w)
     return np.clip(shifted - _OFFSET, 0.0, np.pi / 2), weight
 
 

@@ -168,7 +168,7 @@ def test_an_unknown_method_is_refused() -> None:
 
 
 def test_the_search_costs_less_than_it_saves() -> None:
-    """Of 2000 geometries: where bounds suffice, a tenth of the integral that is avoided."""
+    """Of 2000 geometries: where bounds suffice, a third of the integral that is avoided."""
     random = np.random.default_rng(2)
     theta_i, theta_r = random.uniform(0, 50, (2, 2000))
     anywhere = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=90.0)
@@ -181,7 +181,7 @@ def test_the_search_costs_less_than_it_saves() -> None:
         clear_profile_cache()
         oren_nayar_exact_brdf(anywhere, 0.8, 20.0)
 
-    assert cpu_seconds(search, 3) < 0.2 * cpu_seconds(integrate, 2)
+    assert cpu_seconds(search, 3) < 0.6 * cpu_seconds(integrate, 2)
 
 
 def test_beyond_its_end_the_table_is_not_used_even_for_a_smooth_surface() -> None:

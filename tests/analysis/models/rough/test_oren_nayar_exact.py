@@ -79,10 +79,47 @@ def nearly_special(count: int) -> Geometry:
 def test_the_rules_keep_their_stated_accuracy(rule: Rule, accuracy: float) -> None:
     for geometry in (special_directions(400), nearly_special(400)):
         for sigma in (0.5, 5.0, 20.0, 60.0):
-            best = oren_nayar_exact_brdf(geometry, 1.0, sigma, Rule(30, 18, 48))
+            best = oren_nayar_exact_brdf(geometry, 1.0, sigma, Rule(26, 18, 90))
             got = oren_nayar_exact_brdf(geometry, 1.0, sigma, rule)
             np.testing.assert_allclose(got, best, rtol=accuracy)
     clear_profile_cache()
+
+
+@pytest.mark.parametrize("theta", [86.0, 88.0, 89.0, 89.9, 90.0])
+def test_near_grazing_the_rules_are_worse_as_stated(theta: float) -> None:
+    random = np.random.default_rng(12)
+    other = np.where(
+        random.random(150) < 0.5, random.uniform(0, 1, 150), random.uniform(0.97, 1, 150)
+    )
+    geometry = Geometry.from_degrees(
+        theta_i=theta,
+        theta_r=np.minimum(theta, 89.9) * other,
+        dphi=random.choice([0.0, 30.0, 90.0, 150.0, 170.0, 180.0], 150),
+    )
+    for sigma in (1.0, 10.0, 60.0):
+        best = oren_nayar_exact_brdf(geometry, 1.0, sigma, Rule(20, 14, 300))
+        for rule, accuracy in ((COARSE, 4e-4), (RULE, 1e-5), (FINE, 2e-8)):
+            got = oren_nayar_exact_brdf(geometry, 1.0, sigma, rule)
+            np.testing.assert_allclose(got, best, rtol=accuracy)
+    clear_profile_cache()
+
+
+@settings(max_examples=200)
+@given(
+    theta=st.floats(0, 89),
+    dphi=st.one_of(st.floats(0, 360), st.sampled_from([0.0, 90.0, 180.0])),
+    sigma_deg=st.floats(0.5, 60),
+    albedo=st.floats(0.01, 1),
+    lamp=st.booleans(),
+)
+def test_the_value_at_90_degrees_is_the_limit(
+    theta: float, dphi: float, sigma_deg: float, albedo: float, lamp: bool
+) -> None:
+    grazing, other = np.array([90.0, 90 - 1e-6]), np.full(2, theta)
+    i, r = (grazing, other) if lamp else (other, grazing)
+    geometry = Geometry.from_degrees(theta_i=i, theta_r=r, dphi=dphi)
+    at_90, limit = EXACT.brdf(geometry, albedo=albedo, sigma_deg=sigma_deg)
+    assert at_90 == pytest.approx(limit, rel=1e-6)
 
 
 def test_errors_of_the_printed_forms_are_those_of_the_errata() -> None:
