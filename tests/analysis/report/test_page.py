@@ -13,7 +13,9 @@ import pytest
 
 from analysis.report.data import Parameter, ReportData
 from analysis.report.page import report_html, write_report
+from analysis.report.style import format_value
 from instrument.errors import StorageError
+from instrument.geometry import FloatArray
 from instrument.record.reading import Preview
 from tests.support.analysis.report_data import NAN, data_of, png, svgs, without_tile, words
 
@@ -172,6 +174,45 @@ class TestBrokenNumbers:
         assert len(svgs(report_html(whole))) == 6
         page = report_html(replace(whole, **columns))
         assert "No geometry has a value to plot." in page
+
+    @pytest.mark.parametrize("seed", range(4))
+    def test_numbers_over_600_decades(self, seed: int) -> None:
+        """Values, u, parameters and criteria from 1e-300 to 1e300, of either sign, and zeros."""
+        rng = np.random.default_rng(seed)
+
+        def wide(n: int) -> FloatArray:
+            return 10.0 ** rng.uniform(-300, 300, n) * rng.choice([1, 1, -1, 0], n)
+
+        data = data_of((30.0,))
+        points = len(data.flags)
+        value, u, low = wide(8), np.abs(wide(8)), wide(8)
+        parameters = tuple(
+            Parameter(f"p{n}", value[n], u[n] if n < 6 else None, (low[n], value[n]), "°")
+            for n in range(8)
+        )
+        rms, chi2, bic = wide(3).tolist()
+        chosen = replace(
+            data.candidates[1],
+            parameters=parameters,
+            rms_relative=rms,
+            reduced_chi2=chi2,
+            bic=bic,
+            residuals=wide(points - 3),
+        )
+        flags = ("saturated",) * 3 + ("",) * (points - 3)
+        # The charts plot ratios of these, which a float must hold.
+        columns: dict[str, Any] = {
+            "brdf": np.cbrt(wide(points)),
+            "u_brdf": np.cbrt(np.abs(wide(points))),
+        }
+        fitted = np.array([not flag for flag in flags])
+        text = words(
+            report_html(replace(data, candidates=(chosen,), flags=flags, fitted=fitted, **columns))
+        )
+        assert "nan" not in text.lower()
+        for parameter in parameters[:6]:
+            shown = format_value(parameter.value, parameter.u, parameter.unit)
+            assert " ".join(shown.split()) in text
 
     def test_all_flagged_and_all_zero(self) -> None:
         data = data_of(theta_r=(0.0,))
