@@ -22,7 +22,11 @@ SAME_CHI2 = 2.0
 
 
 def simplest(converged: Iterable[FitResult], measurements: Measurements) -> FitResult:
-    """The simplest candidate on which no larger or costlier one improves enough."""
+    """The simplest candidate on which no larger or costlier one improves enough.
+
+    Beside the evidence of BIC, what a candidate predicts worse, held out of the fit, must be less
+    than what it fits better: as ratios of residuals.
+    """
     current, *larger = sorted(converged, key=lambda c: c.x.size)  # stable: the ladder's order
     best = min((current, *larger), key=lambda c: c.bic)
     left_out = folds(measurements) if larger else []
@@ -40,9 +44,16 @@ def simplest(converged: Iterable[FitResult], measurements: Measurements) -> FitR
         needed = STRONG_BIC if candidate.x.size > current.x.size else TIE_BIC
         if evidence <= needed or _equivalent(current, candidate):
             continue
-        if not left_out or score(candidate) < score(current):
+        if not left_out or score(candidate) * _misfit(candidate) < score(current) * _misfit(
+            current
+        ):
             current = candidate
     return current
+
+
+def _misfit(result: FitResult) -> float:
+    """Size of the residuals, in a unit that the candidates share."""
+    return result.rms_relative if result.chi2 is None else math.sqrt(result.chi2)
 
 
 def _bic_difference(candidate: FitResult, other: FitResult, best: FitResult, points: int) -> float:
