@@ -1,7 +1,8 @@
 """Scans of the paper's samples on the simulated rigs recover the samples' parameters.
 
 Published parameters: Oren and Nayar 1995, Figs 16-18 and 20-22. Their k_s/k_d omits the factor 1/4
-of the Torrance-Sparrow term here, so ks is four times their value.
+of the Torrance-Sparrow term here, so ks is four times their value. Samples A to C are simulated by
+the exact integral (31), as the paper drew them.
 """
 
 from __future__ import annotations
