@@ -18,6 +18,7 @@ from acquisition.engine.positioner import Positioner
 from acquisition.engine.preview import make_preview
 from acquisition.engine.resume import Progress, check_text
 from acquisition.engine.retrying_camera import RetryingCamera
+from acquisition.measure.placement import Placement
 from acquisition.measure.radiometry import Signal, measure
 from acquisition.measure.window import Window, window_at
 from acquisition.plan.moves import NoPathError
@@ -205,8 +206,9 @@ class Engine:
 
     def _measure(self, exposed: Exposed) -> Reading:
         window, least = self._window(exposed.step), self._protocol.window.min_pixels
-        camera, u_placement_mm = self._rig.camera, self._rig.u_placement_mm
-        signal = measure(exposed.frames, exposed.dark, window, camera, u_placement_mm, least)
+        rig, theta_i_deg = self._rig, exposed.step.pose.theta_i
+        placement = Placement(rig.u_placement_mm, theta_i_deg, rig.lamp_distance_mm)
+        signal = measure(exposed.frames, exposed.dark, window, rig.camera, placement, least)
         return _reading(exposed, window, signal)
 
     def _add_event(self, kind: str, text: str) -> None:

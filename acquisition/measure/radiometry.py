@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.measure.placement import Placement, placement_u_dn
 from acquisition.measure.window import Window
 from instrument.config.camera import CameraConfig
 from instrument.devices import Frame, Image
-from instrument.geometry import FloatArray, IntArray
+from instrument.geometry import FloatArray
 
 SATURATION_FRACTION = 0.97  # of full scale: above it the response is not trusted
 
@@ -63,7 +64,7 @@ def measure(
     dark: Dark,
     window: Window,
     camera: CameraConfig,
-    u_placement_mm: float,
+    placement: Placement,
     min_pixels: int,
 ) -> Signal:
     """Return the window's mean over all frames minus the dark, with uncertainty and flags."""
@@ -73,7 +74,7 @@ def measure(
     saturated = sum(int(np.count_nonzero(counts >= camera.max_dn)) for counts in counted)
     peak = bright_level(counted[0]) if counted[0].size else float("nan")
     u_dark_noise = _u_noise(window, dark.variance[window.crop] / dark.frames)
-    u_placement, u_texture = _u_placement(frames, dark, window, u_placement_mm)
+    u_placement, u_texture = placement_u_dn(frames, dark.mean, window, placement)
     return Signal(
         signal_dn=window.mean(mean - dark.mean[window.crop]),
         u_noise_dn=_u_noise(window, variance / len(frames)),
@@ -140,40 +141,6 @@ def rounding_u_dn(noise_variance_dn2: float) -> float:
     k = np.arange(1, 2000)
     damped = np.exp(-4 * np.pi**2 * k**2 * noise_variance_dn2) / (2 * np.pi**2 * k**2)
     return float(np.sqrt(damped.sum()))
-
-
-def _u_placement(
-    frames: Sequence[Frame], dark: Dark, window: Window, u_mm: float
-) -> tuple[float, float]:
-    """Return the effect of a surface u_mm closer to the camera, in DN: first and second order.
-
-    Such a surface appears shifted, so the window averages a neighbouring patch. The effect is
-    estimated by shifting the window over the measured image by the same amount, to both sides.
-    """
-    shift = np.array(window.shift_px_per_mm[::-1]) * u_mm  # rows, columns
-    whole = np.rint(shift).astype(int)
-    if not whole.any():
-        whole[np.argmax(np.abs(shift))] = 1 if shift[np.argmax(np.abs(shift))] >= 0 else -1
-    ahead, behind = (_shifted(window.crop, by * whole) for by in (1, -1))
-    inside = all(
-        s.start >= 0 and s.stop <= size
-        for crop in (ahead, behind)
-        for s, size in zip(crop, dark.mean.shape, strict=True)
-    )
-    if not u_mm or not window.inside_frame or not inside:
-        return 0.0, 0.0
-    part = float(np.linalg.norm(shift) / np.linalg.norm(whole))
-    before, here, after = (
-        window.mean(frames[0].image[crop] - dark.mean[crop])
-        for crop in (behind, window.crop, ahead)
-    )
-    # A normal displacement x of standard uncertainty u has rms(x^2) = sqrt(3) u^2.
-    return -part * (after - before) / 2, part**2 * np.sqrt(3) * abs(after + before - 2 * here) / 2
-
-
-def _shifted(crop: tuple[slice, slice], by: IntArray) -> tuple[slice, slice]:
-    rows, columns = (slice(s.start + n, s.stop + n) for s, n in zip(crop, by.tolist(), strict=True))
-    return rows, columns
 
 
 def _flags(

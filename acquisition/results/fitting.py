@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.results.reduction import Reduced, require_usable, root_sum_square
+from acquisition.results.reduction import Reduced, require_usable, root_sum_square, shared_errors
 from analysis.choice.choice import Choice, choose
 from analysis.choice.fit_json import no_fit_json, to_json
 from analysis.data.acceptance import Acceptance
@@ -111,7 +111,7 @@ def measurements(reduced: Reduced, loaded: Loaded) -> Measurements:
         brdf=brdf,
         u_random=u_relative * np.abs(brdf),
         lamp_setting=np.array([p.lamp_setting for p in points], dtype=np.int64),
-        shared=tuple(e.subset(keep) for e in (*reduced.shared, *reduced.shared_by_tile)),
+        shared=tuple(e.subset(keep) for e in shared_errors(reduced, loaded.rig)),
         u_theta_i_deg=axes.theta_i.u_deg,
         u_theta_r_deg=axes.theta_r.u_deg,
         u_dphi_deg=axes.dphi.u_deg,

@@ -14,7 +14,7 @@ from itertools import repeat
 
 import numpy as np
 
-from acquisition.results.reduction import Reduced, root_sum_square
+from acquisition.results.reduction import Reduced, root_sum_square, shared_errors
 from analysis.data import csv_columns as columns
 from analysis.data.acceptance import Acceptance
 from instrument.config.load import Loaded
@@ -59,10 +59,13 @@ def _columns_for_fits(reduced: Reduced, loaded: Loaded) -> Iterator[tuple[str, I
     yield columns.LAMP_SETTING.name, _numbered(settings)
     u_relative = root_sum_square(list(reduced.components.values()))
     yield columns.U_INDEPENDENT.name, _cells(u_relative)
-    errors = (*reduced.shared, *reduced.shared_by_tile)
+    errors = shared_errors(reduced, loaded.rig)
     for stem, error in zip(columns.stems(e.name for e in errors), errors, strict=True):
         yield columns.u_shared(stem).name, _cells(error.u_relative)
         yield columns.group(stem).name, _numbered(error.group)
+        for column, angle in zip(columns.angles_by(stem), error.angles_deg, strict=True):
+            if np.any(angle):
+                yield column.name, _cells(np.asarray(angle))
     axes = loaded.rig.axes
     u_deg = (axes.theta_i.u_deg, axes.theta_r.u_deg, axes.dphi.u_deg)
     for column, u in zip(columns.U_ANGLES, u_deg, strict=True):

@@ -9,14 +9,16 @@ section 3). Use `reduced_run` for a record, and `reduce` for readings in memory.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from acquisition.measure.drift import Drift, rate
+from acquisition.measure.placement import tilt_deg
 from analysis.data.measurements import SharedError
 from instrument.config.load import Loaded
 from instrument.config.protocol import Protocol
+from instrument.config.rig import Rig
 from instrument.errors import AllFlagged, NoMeasurement, NotDetermined
 from instrument.geometry import BoolArray, FloatArray
 from instrument.record.reading import Check, Reading
@@ -27,6 +29,8 @@ NOISE, ROUNDING, DRIFT = "photon and read noise", "rounding to counts", "lamp dr
 DARK, PLACEMENT, TEXTURE = "dark frames", "sample placement", "texture at the window edge"
 NO_TILE_YET, NO_SIGNAL = "no white tile yet", "no signal"
 TILE_READING, TILE = "white tile reading", "white tile certificate"
+TILE_PLACEMENT = "white tile placement"
+_ANGLES = ("theta_i_deg", "theta_r_deg")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,12 +83,18 @@ class Reduced:
         return bool(np.any(np.isfinite(self.brdf)))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Tile:
-    """Reading of the white tile at one lamp setting: counts/s, relative u and flags."""
+    """Reading of the white tile at one lamp setting: counts/s, relative u and flags.
+
+    u_own: of noise, rounding, dark and drift. u_placement: signed; the readings that have the same
+    number in `placement` share its error.
+    """
 
     rate: float
-    u_relative: float
+    u_own: float
+    u_placement: float
+    placement: int
     flags: str
 
 
@@ -123,7 +133,12 @@ def reduce(readings: Sequence[Reading], protocol: Protocol, checks: Sequence[Che
     points = tuple(r for r in readings if r.kind == "point")
     blocks = sorted({r.block for r in readings})
     drifts = {block: Drift.of(readings, block, checks) for block in blocks}
-    tiles = {r.lamp_setting: _tile(r, drifts[r.block]) for r in readings if r.kind == "tile"}
+    placements = _placements(readings)
+    tiles = {
+        r.lamp_setting: _tile(r, drifts[r.block], placements[r.step])
+        for r in readings
+        if r.kind == "tile"
+    }
     radiance = np.array([rate(p) / drifts[p.block].at(p.time_s) for p in points])
     tile = protocol.references.white_tile
     known = tile.reflectance / np.pi if tile is not None else np.nan
@@ -134,11 +149,22 @@ def reduce(readings: Sequence[Reading], protocol: Protocol, checks: Sequence[Che
         radiance=radiance,
         brdf=radiance / white * known,
         components=_components(points),
-        shared=(*_shared(readings, points), *_drift_noise(points, drifts)),
+        shared=(*_shared(points, placements), *_drift_noise(points, drifts)),
         shared_by_tile=_shared_by_tile(points, own, protocol),
         flags=tuple(_flags(p, t, tile is not None) for p, t in zip(points, own, strict=True)),
         drift_levels=tuple(drift.level for drift in drifts.values()),
         drift_checks=sum(r.kind == "drift" for r in readings) + sum(c.jumped for c in checks),
+    )
+
+
+def shared_errors(reduced: Reduced, rig: Rig) -> tuple[SharedError, ...]:
+    """All errors that points share, with the angles that a misplaced sample changes."""
+    theta_i, theta_r = (np.array([getattr(p, n) for p in reduced.points]) for n in _ANGLES)
+    by_i = tilt_deg(theta_i, rig.u_placement_mm, rig.lamp_distance_mm)
+    by_r = tilt_deg(theta_r, rig.u_placement_mm, rig.beam_length_mm)
+    return tuple(
+        replace(error, theta_i_deg=by_i, theta_r_deg=by_r) if error.name == PLACEMENT else error
+        for error in (*reduced.shared, *reduced.shared_by_tile)
     )
 
 
@@ -149,13 +175,17 @@ def _relative(points: Sequence[Reading], name: str) -> FloatArray:
     return relative
 
 
-def _tile(reading: Reading, drift: Drift) -> _Tile:
-    names = ("u_noise_dn", "u_quantisation_dn", "u_dark_dn", "u_placement_dn")
-    counts = [_relative([reading], name)[0] for name in names]
+def _tile(reading: Reading, drift: Drift, placement: int) -> _Tile:
+    names = ("u_noise_dn", "u_quantisation_dn", "u_texture_dn", "u_dark_dn", "u_placement_dn")
+    *own, u_placement = (float(_relative([reading], name)[0]) for name in names)
     return _Tile(
-        rate(reading) / drift.at(reading.time_s),
-        float(np.linalg.norm([*counts, drift.u_extrapolated(reading.time_s)])),
-        "; ".join(f for f in (reading.flags, NO_SIGNAL if reading.signal_dn == 0 else "") if f),
+        rate=rate(reading) / drift.at(reading.time_s),
+        u_own=float(np.linalg.norm([*own, drift.u_extrapolated(reading.time_s)])),
+        u_placement=u_placement,
+        placement=placement,
+        flags="; ".join(
+            f for f in (reading.flags, NO_SIGNAL if reading.signal_dn == 0 else "") if f
+        ),
     )
 
 
@@ -167,22 +197,22 @@ def _components(points: Sequence[Reading]) -> dict[str, FloatArray]:
     }
 
 
-def _shared(readings: Sequence[Reading], points: Sequence[Reading]) -> tuple[SharedError, ...]:
+def _shared(points: Sequence[Reading], placements: Mapping[int, int]) -> tuple[SharedError, ...]:
     """Errors of the darks, one for each exposure, and of the sample's placement after each swap."""
     exposures = np.unique([p.exposure_s for p in points], return_inverse=True)[1]
-    placed = {r.step: n for n, r in zip(_placements(readings), readings, strict=True)}
-    placements = np.array([placed[p.step] for p in points], dtype=np.int64)
+    placed = np.array([placements[p.step] for p in points], dtype=np.int64)
     return (
         SharedError(DARK, _relative(points, "u_dark_dn"), exposures.astype(np.int64)),
-        SharedError(PLACEMENT, _relative(points, "u_placement_dn"), placements),
+        SharedError(PLACEMENT, _relative(points, "u_placement_dn"), placed),
     )
 
 
-def _placements(readings: Sequence[Reading]) -> list[int]:
-    """Number of swaps of sample and tile before each reading."""
+def _placements(readings: Sequence[Reading]) -> dict[int, int]:
+    """Number of swaps of sample and tile before each reading, by its step."""
     before = (*readings[:1], *readings)
     changes = [a.surface != b.surface for a, b in zip(readings, before, strict=False)]
-    return [int(n) for n in np.cumsum(changes)]
+    steps = (r.step for r in readings)
+    return dict(zip(steps, np.cumsum(changes, dtype=np.int64).tolist(), strict=True))
 
 
 def _drift_noise(points: Sequence[Reading], drifts: Mapping[int, Drift]) -> tuple[SharedError, ...]:
@@ -215,15 +245,23 @@ def _drift_noise(points: Sequence[Reading], drifts: Mapping[int, Drift]) -> tupl
 def _shared_by_tile(
     points: Sequence[Reading], tiles: Sequence[_Tile | None], protocol: Protocol
 ) -> tuple[SharedError, ...]:
-    """Errors of the tile's reading, one for each lamp setting, and of its certificate."""
+    """Errors of the tile: its readings, its placements, and its certificate.
+
+    One reading serves all points of a lamp setting, and one placement several readings.
+    """
     tile = protocol.references.white_tile
     if tile is None:
         return ()
     settings = np.array([p.lamp_setting for p in points], dtype=np.int64)
-    u_reading = np.array([np.nan if t is None else t.u_relative for t in tiles])
+    own, placement = (
+        np.array([np.nan if t is None else getattr(t, name) for t in tiles])
+        for name in ("u_own", "u_placement")
+    )
+    placed = np.array([-1 if t is None else t.placement for t in tiles], dtype=np.int64)
     u_certificate = tile.u_reflectance / tile.reflectance
     return (
-        SharedError(TILE_READING, u_reading, settings),
+        SharedError(TILE_READING, own, settings),
+        SharedError(TILE_PLACEMENT, placement, placed),
         SharedError.common_to_all(TILE, u_certificate, len(points)),
     )
 

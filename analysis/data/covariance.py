@@ -151,7 +151,9 @@ def full_covariance(
         ("dphi, lamp setting", {"dphi": m.u_dphi_deg}, own, m.lamp_setting),
     )
     groups = [(name, angle_sensitivity(m, brdf, **u), group) for name, u, brdf, group in angles]
-    groups += [(error.name, f * error.u_relative, error.group) for error in m.shared]
+    for error in m.shared:
+        turned = angle_sensitivity(m, own, theta_i=error.theta_i_deg, theta_r=error.theta_r_deg)
+        groups.append((error.name, f * error.u_relative + turned, error.group))
     if m.free_levels:
         groups.append((LAMP_LEVEL, _U_UNKNOWN_LEVEL * f, m.lamp_setting))
     second_order = [_second_order_u(m, smooth, **u) for _, u, _, _ in angles]
@@ -213,14 +215,15 @@ def _numbered(names: list[str]) -> Iterator[str]:
         yield name if total[name] == 1 else f"{name} {so_far[name]}"
 
 
-def angle_sensitivity(m: Measurements, smooth: Brdf, **u_angle: float) -> FloatArray:
+def angle_sensitivity(m: Measurements, smooth: Brdf, **u_angle: FloatArray | float) -> FloatArray:
     """Shift (N,) of `smooth` in 1/sr by one u of an angle: half its change from -u to +u.
 
-    `u_angle` is one of theta_i, theta_r and dphi, in degrees; `smooth` gives BRDF of the geometry's
-    shape. Steps of u itself include a kink as far as u reaches over it. Beyond 90 degrees there is
-    no geometry: the change on the other side then counts alone.
+    `u_angle`: theta_i, theta_r or dphi, or those that one error changes together, (N,) or a single
+    number each, in degrees. `smooth` gives BRDF of the geometry's shape. Steps of u itself include
+    a kink as far as u reaches over it. Beyond 90 degrees there is no geometry: the change on the
+    other side then counts alone.
     """
-    if not any(u_angle.values()):
+    if not any(np.any(u) for u in u_angle.values()):
         return np.zeros(m.size)
     up, up_step = _moved(m, 1, **u_angle)
     down, down_step = _moved(m, -1, **u_angle)
@@ -240,7 +243,12 @@ def _second_order_u(m: Measurements, smooth: Brdf, **u_angle: float) -> FloatArr
 
 
 def _moved(
-    m: Measurements, sign: int, *, theta_i: float = 0.0, theta_r: float = 0.0, dphi: float = 0.0
+    m: Measurements,
+    sign: int,
+    *,
+    theta_i: FloatArray | float = 0.0,
+    theta_r: FloatArray | float = 0.0,
+    dphi: FloatArray | float = 0.0,
 ) -> tuple[Geometry, FloatArray]:
     """Geometry with the angles moved, and (N,): 1 where that is possible, 0 elsewhere."""
     new_i, new_r = m.theta_i_deg + sign * theta_i, m.theta_r_deg + sign * theta_r

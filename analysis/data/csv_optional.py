@@ -71,7 +71,9 @@ class OptionalColumns:
             if u_relative is not None:
                 group = self.whole_numbers(columns.group(stem))
                 group = np.zeros(len(self.rows), dtype=np.int64) if group is None else group
-                found.append(SharedError(columns.error_name(stem), u_relative, group))
+                angles = (self.numbers(column) for column in columns.angles_by(stem))
+                by_angle = (0.0 if angle is None else angle for angle in angles)
+                found.append(SharedError(columns.error_name(stem), u_relative, group, *by_angle))
         return tuple(found)
 
     def acceptance(self) -> Acceptance | None:

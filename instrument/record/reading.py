@@ -18,12 +18,12 @@ class Reading:
     area-weighted mean over the window and all frames, dark subtracted, divided by cos^4. The u are
     its standard uncertainties: `u_noise_dn` from photon and read-out noise, `u_quantisation_dn`
     from rounding the frames to whole counts, `u_dark_dn` from the dark (shared by all readings of
-    one exposure), `u_placement_dn` from the position of the sample on the axis (signed: one
-    placement shifts all its readings together), and `u_texture_dn` from the texture at the
-    window's edge, to second order of the placement. `lamp_setting` counts the positions of the
-    lamp, `block` the times that it was set by hand. `time_s` is the scan time at the end of the
-    frames, without interruptions of the scan; `free_s` is the time at which the rig could move
-    on, the dark having been taken.
+    one exposure), `u_placement_dn` from the height of the surface above the axis (signed: one
+    placement shifts all its readings together; without the part that depends on the reflectance),
+    and `u_texture_dn` from the texture at the window's edge, to second order of the placement.
+    `lamp_setting` counts the positions of the lamp, `block` the times that it was set by hand.
+    `time_s` is the scan time at the end of the frames, without interruptions of the scan; `free_s`
+    is the time at which the rig could move on, the dark having been taken.
     """
 
     step: int

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import ndtr
 
+from acquisition.measure.placement import Placement
 from acquisition.measure.radiometry import Dark, average_dark, measure, rounding_u_dn
 from acquisition.measure.window import Window, window_at
 from instrument.config.load import load_rig
@@ -20,6 +21,7 @@ from tests.support.paths import CONFIGS
 
 RIG = load_rig(CONFIGS / "rigs" / "bench_12bit.yaml")
 CAMERA = RIG.camera
+ON_AXIS = Placement(0.0, 0.0, RIG.lamp_distance_mm)
 SHAPE = (CAMERA.height_px, CAMERA.width_px)
 
 
@@ -46,7 +48,7 @@ def test_the_dark_is_subtracted_and_cos4_divided_out() -> None:
     rows, columns = np.ogrid[_window().crop]
     falloff = Pinhole.of(RIG).cos4(columns, rows)
     expected = 1000 * np.sum(_window().weights * falloff / falloff)
-    signal = measure(flat, no_noise, _window(), CAMERA, 0.0, 100)
+    signal = measure(flat, no_noise, _window(), CAMERA, ON_AXIS, 100)
     assert signal.signal_dn == pytest.approx(expected)
     assert signal.signal_dn == pytest.approx(1000, rel=1e-3)  # cos^4 is within 1e-3 of 1 here
 
@@ -54,7 +56,8 @@ def test_the_dark_is_subtracted_and_cos4_divided_out() -> None:
 def test_the_stated_noise_is_the_spread_of_repeated_measurements() -> None:
     window = _window(75.0, 4.0)  # few pixels, so that the noise shows
     series = [
-        measure(_frames(1500, 20, 4, seed), _dark(), window, CAMERA, 0.0, 1) for seed in range(60)
+        measure(_frames(1500, 20, 4, seed), _dark(), window, CAMERA, ON_AXIS, 1)
+        for seed in range(60)
     ]
     spread = np.std([s.signal_dn for s in series], ddof=1)
     # 59 degrees of freedom: the spread is known to 9 %.
@@ -65,8 +68,8 @@ def test_a_single_frame_takes_its_noise_from_the_photon_transfer_curve() -> None
     gain = CAMERA.electrons_per_dn
     electrons = (1500 - CAMERA.black_level_dn) * gain
     sd = np.sqrt(electrons + CAMERA.read_noise_electrons**2) / gain
-    one = measure(_frames(1500, sd, 1), _dark(), _window(), CAMERA, 0.0, 100)
-    many = measure(_frames(1500, sd, 16), _dark(), _window(), CAMERA, 0.0, 100)
+    one = measure(_frames(1500, sd, 1), _dark(), _window(), CAMERA, ON_AXIS, 100)
+    many = measure(_frames(1500, sd, 16), _dark(), _window(), CAMERA, ON_AXIS, 100)
     assert one.u_noise_dn == pytest.approx(4 * many.u_noise_dn, rel=0.1)
 
 
@@ -96,7 +99,8 @@ def test_the_effect_of_a_misplaced_sample_follows_the_gradient_of_the_image() ->
     window, camera = _window(60.0), Pinhole.of(RIG)
     ramp = np.broadcast_to(1000 + 2 * np.arange(SHAPE[1]), SHAPE).astype(np.uint16)
     dark = Dark(0.01, np.full(SHAPE, 64.0), np.zeros(SHAPE), 8)
-    signal = measure([Frame(ramp, 0.01, 0.0)] * 2, dark, window, CAMERA, 1.0, 100)
+    placement = Placement(1.0, 0.0, 1e9)  # of a lamp so far away that its light does not change
+    signal = measure([Frame(ramp, 0.01, 0.0)] * 2, dark, window, CAMERA, placement, 100)
     near, on_axis = (camera.project([0.0, 0.0], 60.0, h)[0] for h in (1.0, 0.0))
     # The surface has moved to the left, so the window sees what belongs further right.
     assert signal.u_placement_dn == pytest.approx(2 * (on_axis - near), rel=0.01)
@@ -123,5 +127,5 @@ def test_the_shift_of_a_misplaced_sample_turns_with_the_camera(roll_deg: float) 
 )
 def test_every_defect_is_flagged(level: int, size: float, theta_r: float, flag: str) -> None:
     frames = [Frame(np.full(SHAPE, level, np.uint16), 0.01, 0.0)] * 2
-    signal = measure(frames, _dark(), _window(theta_r, size), CAMERA, 0.0, 100)
+    signal = measure(frames, _dark(), _window(theta_r, size), CAMERA, ON_AXIS, 100)
     assert signal.flags == flag

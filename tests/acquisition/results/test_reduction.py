@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.results.reduction import DRIFT, reduce
+from acquisition.results.reduction import DRIFT, TILE_PLACEMENT, reduce
 from instrument.config.load import Loaded
 from instrument.record.reading import Check, Reading
 from instrument.record.record import Record
@@ -105,3 +105,22 @@ def test_a_scan_cut_at_any_step_can_be_reduced(full: Loaded, tmp_path: Path) -> 
         reduced = reduce(readings[:count], full.protocol, ())
         assert len(reduced.flags) == len(reduced.points)
         assert np.all(np.isfinite(reduced.brdf[reduced.valid]))
+
+
+def test_one_placement_of_the_tile_shifts_all_values_that_it_serves(
+    small: Loaded, resumed: tuple[list[Reading], list[Check]]
+) -> None:
+    """Move the tile by its u at every reading between two swaps, and compare the change."""
+    readings = resumed[0]
+    found = reduce(readings, small.protocol, ())
+    moved = [
+        replace(r, signal_dn=r.signal_dn - r.u_placement_dn) if r.kind == "tile" else r
+        for r in readings
+    ]
+    change = reduce(moved, small.protocol, ()).brdf / found.brdf - 1
+    stated = [e for e in found.shared_by_tile if e.name == TILE_PLACEMENT]
+    assert len(stated) == 1
+    np.testing.assert_allclose(change, stated[0].u_relative, rtol=2e-3)
+    assert np.all(stated[0].u_relative != 0)
+    setting = [p.lamp_setting for p in found.points]  # by hand, and the tile is placed for each
+    assert np.unique(np.column_stack([stated[0].group, setting]), axis=0).shape[0] == 2

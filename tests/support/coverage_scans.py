@@ -1,0 +1,148 @@
+"""Simulated scans with drawn errors, and their deviations from the truth in units of the stated u.
+
+The draws: noise, angle errors, tile, mottling, height of each placement, lamp drift, and the part
+of a count by which the black level differs from a whole number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.engine.engine import Devices
+from acquisition.measure.window import window_at
+from acquisition.results.fitting import measurements
+from acquisition.results.reduction import reduce
+from analysis.data.acceptance import Acceptance, averaged_brdf
+from analysis.data.covariance import full_covariance
+from analysis.data.measurements import Measurements
+from analysis.fit.fit import fit
+from analysis.models import MODELS
+from instrument.config.load import Loaded, load_protocol
+from instrument.config.protocol import DriftCheck, References, SimulatedSample, WhiteTile
+from instrument.devices import Request
+from instrument.geometry import FloatArray, Geometry
+from instrument.pinhole import Pinhole
+from instrument.record.record import Record
+from sim.scene.operator import SimulatedOperator
+from sim.scene.render import electrons_per_s
+from tests.support.paths import CONFIGS
+from tests.support.scans import changed, exact_rig, simulated_scene
+from tests.support.stopped_scan import scan
+
+BANDS_DEG = ((0.0, 30.0), (30.0, 60.0), (60.0, 75.0), (75.0, 85.0))
+_RINGS = 4  # of the truth's average over lamp and lens
+
+
+@dataclass(frozen=True, slots=True)
+class Deviations:
+    """Deviations of one scan: of points (N,) at theta_r_deg (N,), and of fitted parameters.
+
+    In units of the stated u; a parameter without u is left out.
+    """
+
+    theta_r_deg: FloatArray
+    points: FloatArray
+    parameters: dict[str, float]
+
+
+class PlacingOperator:
+    """Simulated operator who places each surface at a height of its own, in mm."""
+
+    def __init__(self, operator: SimulatedOperator, u_mm: float, seed: int) -> None:
+        self._operator, self._u_mm = operator, u_mm
+        self._random = np.random.default_rng([seed, 1])
+
+    def ask(self, request: Request) -> str:
+        """Carry out a request; a placing draws the height."""
+        if request.action == "place":
+            scene = self._operator._scene
+            height = float(self._u_mm * self._random.standard_normal())
+            simulation = scene.rig.simulation.model_copy(update={"sample_height_mm": height})
+            scene.rig = scene.rig.model_copy(update={"simulation": simulation})
+        return self._operator.ask(request)
+
+
+def drawn_scan(rig: str, sample: SimulatedSample, seed: int, bits: int | None = None) -> Loaded:
+    """Two incidences and 19 view angles on a rig with drawn errors; the tile is known exactly."""
+    demo = load_protocol(CONFIGS / "protocols" / "demo.yaml", CONFIGS / "rigs" / f"{rig}.yaml")
+    random = np.random.default_rng([seed, 2])
+    camera = demo.rig.camera
+    camera = camera.model_copy(
+        update={
+            "bit_depth": bits or camera.bit_depth,
+            "black_level_dn": camera.black_level_dn + random.uniform(-0.5, 0.5),
+        }
+    )
+    simulation = demo.rig.simulation.model_copy(
+        update={"seed": seed, "lamp_drift_per_hour": 0.02 * float(random.standard_normal())}
+    )
+    sweep = {
+        "theta_i_deg": [30.0, 60.0],
+        "dphi_deg": [0.0],
+        "theta_r_deg": [*np.arange(-80.0, 0.0, 10.0), -5.0, 0.0, 5.0, *np.arange(10.0, 81.0, 10.0)],
+    }
+    tile = WhiteTile(reflectance=0.99, u_reflectance=0.0, theta_r_deg=10.0)
+    references = References(
+        white_tile=tile, drift_check=DriftCheck(theta_r_deg=10.0, every_points=20)
+    )
+    return changed(
+        demo,
+        rig={"camera": camera, "simulation": simulation},
+        sweeps=[sweep],
+        references=references,
+        simulated_sample=sample,
+    )
+
+
+def _mean_sample(m: Measurements, loaded: Loaded) -> Measurements:
+    """Measurements divided by the mean of the mottling over the patch: the sample is its model."""
+    rig, patch = exact_rig(loaded.rig), loaded.protocol.window
+    window = window_at(0.0, Pinhole.of(rig), patch.width_mm, patch.height_mm)
+    plain = loaded.protocol.simulated_sample.model_copy(update={"mottling": 0.0})
+    levels = []
+    for sample in (loaded.protocol.simulated_sample, plain):
+        scene = simulated_scene(changed(replace(loaded, rig=rig), simulated_sample=sample))
+        levels.append(window.mean(electrons_per_s(scene)[window.crop].astype(np.float64)))
+    factor = levels[0] / levels[1]
+    return replace(m, brdf=m.brdf / factor, u_random=m.u_random / factor)
+
+
+def measured(loaded: Loaded, folder: Path) -> Measurements:
+    """Run a scan with drawn placements, and return its measurements as the fit takes them."""
+    rig = loaded.rig
+
+    def placing(devices: Devices) -> Devices:
+        assert isinstance(devices.operator, SimulatedOperator)
+        own = PlacingOperator(devices.operator, rig.u_placement_mm, rig.simulation.seed)
+        return replace(devices, operator=own)
+
+    with Record.create(folder, {}) as record:
+        scan(loaded, record, changed_devices=placing)
+        m = measurements(reduce(record.readings(), loaded.protocol, ()), loaded)
+    return _mean_sample(m, loaded)
+
+
+def deviations(m: Measurements, loaded: Loaded) -> Deviations:
+    """Compare measured values, and the fit of the true model to them, with the truth."""
+    sample = loaded.protocol.simulated_sample
+    assert sample is not None
+
+    def true_model(geometry: Geometry) -> FloatArray:
+        return MODELS[sample.model].brdf(geometry, **sample.parameters)
+
+    acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
+    angles = (m.theta_i_deg, m.theta_r_deg, m.dphi_deg)
+    truth = averaged_brdf(true_model, *angles, acceptance, _RINGS)
+    fitted = fit(MODELS[sample.model], m, acceptance)
+    return Deviations(
+        m.theta_r_deg,
+        (m.brdf - truth) / full_covariance(m, true_model).u_total,
+        {
+            name: (fitted.values[name] - sample.parameters[name]) / u
+            for name, u in fitted.u.items()
+            if u is not None
+        },
+    )
