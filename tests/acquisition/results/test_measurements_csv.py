@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from acquisition.engine.engine import Engine
+from acquisition.engine.resume import Progress
 from acquisition.plan.plan import make_plan
 from acquisition.results.fitting import measurements
 from acquisition.results.measurements_csv import COLUMNS, measurements_csv
@@ -112,7 +113,7 @@ def test_the_table_holds_exactly_what_the_fit_takes(tmp_path: Path, slow: bool) 
         loaded, stop, resumed = random_case(seed)
         with Record.create(tmp_path / str(seed), {}) as record:
             scan(loaded, record, stop)
-            if stop is not None and seed % 3:
+            if seed % 3 and Progress.of(record).missing(make_plan(resumed)):
                 scan(resumed, record)
             found = reduce(record.readings(), loaded.protocol, record.checks())
         path = tmp_path / f"{seed}.csv"
