@@ -58,7 +58,12 @@ def _symmetry(tested: Symmetry) -> dict[str, Any]:
 
 
 def _parameter(result: FitResult, name: str) -> dict[str, Any]:
-    return _estimate(result.values[name], result.u[name], result.intervals.get(name))
+    """Value and u; without u the profile interval, or the domain where no profile was computed."""
+    interval = result.intervals.get(name)
+    if result.u[name] is None and interval is None:
+        domain = next(p for p in result.problem.model.parameters if p.name == name)
+        interval = domain.low, domain.high
+    return _estimate(result.values[name], result.u[name], interval)
 
 
 def _ratio(ratio: Ratio) -> dict[str, Any]:

@@ -89,9 +89,10 @@ def once_hidden(arcs: OnceHiddenArcs, size: int, nodes: int) -> FloatArray:
 
 
 def twice_hidden(arcs: TwiceHiddenArcs, equal: FloatArray, nodes: int) -> FloatArray:
-    """Integrals of (1 + x) e_2 + (x y - 1) cos - W over the arcs.
+    """Integrals of (1 + x) e_2 + (x y - 1) cos - W over the arcs (K,), dimensionless, (K,).
 
-    Steep facets have a sharp bend at v = `equal`, where x = y; their arcs are divided there.
+    `equal`: (K,), v = tan(phi / 2) where x = y. Steep facets have a sharp bend there, where their
+    arcs are divided.
     """
     k = np.flatnonzero((arcs.sine > 0.8) & (equal > arcs.low) & (equal < arcs.high))
     arcs = TwiceHiddenArcs(*(np.concatenate([values, values[k]]) for values in arcs))

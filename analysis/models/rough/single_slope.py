@@ -78,7 +78,7 @@ class DirectionPairs(NamedTuple):
         return cls(tan_1, tan_2, dphi, cosine, sine, *half, equal, steepness, v_opposite)
 
     def chosen(self, at: IntArray) -> DirectionPairs:
-        """Pairs at those indices."""
+        """Pairs at those indices (M,)."""
         return DirectionPairs(*(values.take(at) for values in self))
 
 

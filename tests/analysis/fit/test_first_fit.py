@@ -135,7 +135,9 @@ def test_outliers_are_reported_and_the_truth_is_found(seed: int, stated: bool) -
         assert found.values[name] == pytest.approx(true, abs=3.5 * (found.u[name] or 0))
     choice = choose(m, models=["lambert", NAME], robust=True)
     assert (choice.chosen, choice.verdict) == (NAME, "adequate")
-    assert choose(m, models=["lambert", NAME]).verdict == "none adequate" or not stated
+    if stated:  # without the robust loss, no model agrees within the stated u
+        plain = choose(m, models=["lambert", NAME])
+        assert plain.verdict == "none adequate" or (plain.u_scale or 0) > 2
 
 
 @pytest.mark.parametrize("stated", [True, False])
