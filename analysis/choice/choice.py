@@ -65,8 +65,8 @@ def choose(
 ) -> Choice:
     """Fit every model and choose the simplest that explains the data as well as the best does.
 
-    Without `models`, the candidates are those of the ladder, up to the rung after the first that
-    explains the data; an integrated model whose functional form is as accurate is then left out,
+    Without `models`, the candidates are those of the ladder, up to the first rung that explains
+    the data; an integrated model whose functional form is as accurate is then left out,
     unless a `method` for the rough surface is requested. Models with too many parameters for the
     points are left out. Raises `NotDetermined` when the points are too few for all of them or show
     no light, `KeyError` for an unknown model.
@@ -76,13 +76,12 @@ def choose(
     tried = Candidates.of(first, measurements, robust, every=models is not None)
     fitted = _Fitted.of(tried.refined(acceptance), tried.measurements)
     for rung in others:
-        explained = bool(fitted.within_u)
+        if fitted.within_u:
+            break
         tried = tried.with_more(rung)
         known = {c.model for c in fitted.results}
         new = _Fitted.of(tried.refined(acceptance, known), tried.measurements)
         fitted = _Fitted((*fitted.results, *new.results), {**fitted.agreements, **new.agreements})
-        if explained:
-            break
     if not fitted.within_u and others:  # all compared about the same model near the data
         fitted = _Fitted.of(tried.refined(acceptance), tried.measurements)
     return _chosen(tried, fitted, acceptance)
