@@ -76,15 +76,27 @@ class Candidates:
         return replace(self, first=first, left_out=(*self.left_out, *few))
 
     def refined(
-        self, acceptance: Acceptance | None, already: Container[str] = ()
+        self,
+        acceptance: Acceptance | None,
+        already: Container[str] = (),
+        *,
+        thoroughly: bool = True,
     ) -> tuple[FitResult, ...]:
-        """Fit each, but for those `already` fitted, with the uncertainties that are linear."""
+        """Fit each, but for those `already` fitted, with the uncertainties that are linear.
+
+        Unless `thoroughly`, one that is far off with all uncertainties rules out those whose first
+        fits are worse: a candidate with more parameters is needed.
+        """
         m, best = self.measurements, _best(self.first)
-        return tuple(
-            refine(f, m, acceptance, best.brdf, _ruled_out(f, best, m), profiles=False)
-            for f in self.first
-            if f.problem.model.name not in already
-        )
+        new = [f for f in self.first if f.problem.model.name not in already]
+        found: dict[str, FitResult] = {}
+        enough = True
+        for f in sorted(new, key=lambda f: f.solution.chi2):
+            ruled_out = _ruled_out(f, best, m) or not enough
+            result = refine(f, m, acceptance, best.brdf, ruled_out, profiles=False)
+            found[f.problem.model.name] = result
+            enough &= thoroughly or (result.reduced_chi2 or 0.0) <= _RULED_OUT_CHI2
+        return tuple(found[f.problem.model.name] for f in new)
 
     def profiled(self, name: str, acceptance: Acceptance | None) -> FitResult:
         """Fit the candidate of that name with all uncertainties and intervals."""
