@@ -24,10 +24,15 @@ from analysis.data.acceptance import Acceptance
 from analysis.data.measurements import Measurements
 from analysis.fit.criteria import LEAST_NOISE
 from analysis.fit.fit import FitResult
+from analysis.models import MODELS
 
 # Largest number of parameters of the models that are tried together where the lamp's levels are
 # unknown: the best of them gives the levels.
 _SIZE_FOR_LEVELS = 3
+
+
+# Larger models are tried only where no smaller one explains the data.
+_MOST_PARAMETERS_AHEAD = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,23 +70,27 @@ def choose(
 ) -> Choice:
     """Fit every model and choose the simplest that explains the data as well as the best does.
 
-    Without `models`, the candidates are those of the ladder, up to the first rung that explains
-    the data; an integrated model whose functional form is as accurate is then left out,
-    unless a `method` for the rough surface is requested. Models with too many parameters for the
-    points are left out. Raises `NotDetermined` when the points are too few for all of them or show
-    no light, `KeyError` for an unknown model.
+    Without `models`, the candidates are those of the ladder, up to the first rung that explains the
+    data and, within the models of up to three parameters, the next one, which may be right; an
+    integrated model whose functional form is as accurate is then left out, unless a `method` for
+    the rough surface is requested. Models with too many parameters for the points are left out.
+    Raises `NotDetermined` when the points are too few for all of them or show no light, `KeyError`
+    for an unknown model.
     """
     require_light(measurements)
     first, *others = _rungs(measurements, models, method)
     tried = Candidates.of(first, measurements, robust, every=models is not None)
     fitted = _Fitted.of(tried.refined(acceptance, thoroughly=not others), tried.measurements)
     for rung in others:
-        if fitted.within_u:
+        explained = bool(fitted.within_u)
+        if explained and len(MODELS[rung[0]].parameters) > _MOST_PARAMETERS_AHEAD:
             break
         tried = tried.with_more(rung)
         known = {c.model for c in fitted.results}
         new = _Fitted.of(tried.refined(acceptance, known, thoroughly=False), tried.measurements)
         fitted = _Fitted((*fitted.results, *new.results), {**fitted.agreements, **new.agreements})
+        if explained:
+            break
     if not fitted.within_u and others:  # all compared about the same model near the data
         fitted = _Fitted.of(tried.refined(acceptance), tried.measurements)
     return _chosen(tried, fitted, acceptance)
