@@ -219,7 +219,7 @@ def test_a_foreign_slave_is_no_az_drive(tmp_path: Path) -> None:
         running = subprocess.Popen([_compiled(tmp_path), theirs, "1"])
         settings = BusSettings(ours, parity="N")
         try:
-            with ModbusBus("peer", settings.bus, SystemClock()) as bus:
+            with ModbusBus("peer", settings, SystemClock()) as bus:
                 unit = ModbusUnit(bus, "peer", 1, DIRECT_DATA, (6, 8))
                 unit.write(DIRECT_DATA + 1, [999], unit.deadline_s())
             with pytest.raises(DeviceError, match="is no Oriental Motor AZ drive: data number 999"):
