@@ -1,9 +1,9 @@
 """Candidate models of the automatic choice, in rungs by number of parameters.
 
-A rung is tried only where no candidate of the rungs below explains the data. Methods for the same
-physics are ordered by cost: of those that the data cannot distinguish, the first is taken. The
-candidates are the papers' models and sums, and, for real materials, gloss without Fresnel's law and
-light scattered inside.
+Rungs are tried until one explains the data; `choice.choose` says when the next one is tried as
+well. Methods for the same physics are ordered by cost: of those that the data cannot distinguish,
+the first is taken. The candidates are the papers' models and sums, and, for real materials, gloss
+without Fresnel's law and light scattered inside.
 """
 
 from __future__ import annotations
