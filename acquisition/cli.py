@@ -122,6 +122,12 @@ def fit(
             help="Relative u of an error that all values share (0.5% or 0.005), for csv and curet."
         ),
     ] = None,
+    repeats: Annotated[
+        str | None,
+        typer.Option(
+            help="mean: average rows of the same geometry, weighted by 1/u². Default: refuse them."
+        ),
+    ] = None,
     method: Annotated[
         str,
         typer.Option(help="Method for rough surfaces: auto, qualitative, functional or exact."),
@@ -143,6 +149,7 @@ def fit(
         max_theta_deg=max_theta_deg,
         relative=relative,
         u_shared=parse_u_shared(u_shared),
+        repeats=repeats,
     )
     fit_source(source, wanted, models=models, robust=robust, method=method, as_json=json)
 

@@ -16,10 +16,10 @@ from acquisition.terminal.console import out
 from analysis.choice.choice import Choice, choose
 from analysis.choice.fit_json import to_json
 from analysis.choice.ladder import METHODS, MethodOfFit
-from analysis.data.text_file import parse_number
 from analysis.fit.fit import FitResult
 from instrument.errors import InputError
 from instrument.text.quoting import printable
+from instrument.text.text_file import parse_number
 
 _MOST_ROWS = 12  # of the table of candidates
 

@@ -15,9 +15,11 @@ from analysis.data.acceptance import Acceptance
 from analysis.data.csv_table import read_table
 from analysis.data.curet import read_curet
 from analysis.data.measurements import Measurements, SharedError
+from analysis.data.repeats import Repeats, mean_of_repeats
 from instrument.config.protocol import FitConfig
 from instrument.errors import AllFlagged, InputError, NoMeasurement, NotDetermined
 from instrument.record.record import FILE_NAME, Record
+from instrument.text.quoting import printable
 
 FORMATS = ("auto", "run", "csv", "curet")
 
@@ -41,7 +43,8 @@ class Wanted:
 
     format: one of FORMATS. sample: number of the material, for a database. max_theta_deg: largest
     theta_i and theta_r. relative: the values have no absolute scale. u_shared: relative u of an
-    error that all values share, None if there is none; a run states its own.
+    error that all values share, None if there is none; a run states its own. repeats: "mean"
+    averages rows of the same geometry in a table; None refuses them.
     """
 
     format: str = "auto"
@@ -49,6 +52,7 @@ class Wanted:
     max_theta_deg: float = 90.0
     relative: bool = False
     u_shared: float | None = None
+    repeats: str | None = None
 
 
 def read_source(path: Path, wanted: Wanted) -> Source:
@@ -82,6 +86,8 @@ def read_source(path: Path, wanted: Wanted) -> Source:
 
 
 def _check(wanted: Wanted) -> None:
+    if wanted.repeats not in (None, "mean"):
+        raise InputError(f"--repeats: {printable(wanted.repeats or '')}; allowed: mean")
     if wanted.format not in FORMATS:
         raise InputError(f"--format: {wanted.format}; allowed: {', '.join(FORMATS)}")
     if not 0 < wanted.max_theta_deg <= 90:
@@ -92,6 +98,12 @@ def _check(wanted: Wanted) -> None:
 
 def _kind(path: Path) -> str:
     if not path.is_dir():
+        if (path.parent / FILE_NAME).is_file() and path.suffix != ".csv":
+            folder = path.parent
+            raise InputError(
+                f"{path}: is no table; name the folder of its run, {folder}, or its "
+                f"{folder / 'measurements.csv'}"
+            )
         return "csv"
     if (path / FILE_NAME).exists():
         return "run"
@@ -116,11 +128,14 @@ def _run(path: Path) -> Source:
 
 
 def _csv(path: Path, wanted: Wanted) -> Source:
-    table = read_table(path)
+    table = read_table(path, repeats=wanted.repeats is not None)
     m = table.measurements
     if not m.size:
         raise AllFlagged(f"all {table.flagged} points are flagged: there is nothing to fit")
     notes = _flagged(table.flagged, table.flagged + m.size)
+    if wanted.repeats is not None:
+        m, repeats = mean_of_repeats(m)
+        notes += _averaged(repeats, m)
     source = Source(m, table.acceptance, notes)
     return _with_assumptions(source, wanted, states_shared=table.states_shared)
 
@@ -128,6 +143,21 @@ def _csv(path: Path, wanted: Wanted) -> Source:
 def _flagged(flagged: int, points: int) -> tuple[Note, ...]:
     text = f"{flagged} of {points} points are flagged and not fitted"
     return (Note(NoteCode.FLAGGED, text),) if flagged else ()
+
+
+def _averaged(repeats: Repeats, m: Measurements) -> tuple[Note, ...]:
+    if not repeats.geometries:
+        return ()
+    text = f"{repeats.geometries} of {m.size} geometries are means of {repeats.rows} repeats, which"
+    if m.u_random is None:
+        text += (
+            f" scatter by {100 * repeats.scatter:.2g} % of the mean value; each mean counts once"
+        )
+    else:
+        text += f" scatter by {repeats.scatter:.2g} times their u"
+        few = "; the u is too small for what changes between repeats"
+        text += few if repeats.exceed_u else ""
+    return (Note(NoteCode.REPEATS, text),)
 
 
 def _with_assumptions(source: Source, wanted: Wanted, *, states_shared: bool) -> Source:

@@ -33,6 +33,7 @@ class NoteCode(StrEnum):
     SEARCH_END = "search_end"
     # Source of the measurements.
     FLAGGED = "flagged"
+    REPEATS = "repeats"
     U_SHARED = "u_shared"
     ASSUMED_NO_SHARED_ERROR = "assumed_no_shared_error"
     ASSUMED_EXACT_ANGLES = "assumed_exact_angles"

@@ -26,7 +26,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from analysis.data.text_file import parse_number
+from instrument.text.text_file import parse_number
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +104,11 @@ _SHARED = re.compile(r"u_shared_(.+)_relative|group_(.+)|theta_[ir]_by_(.+)_deg"
 def is_read(name: str) -> bool:
     """True for the name of a column that is read; others are ignored."""
     return name in _READ or _SHARED.fullmatch(name) is not None
+
+
+def read_names() -> tuple[str, ...]:
+    """Names of all columns that are read, those about shared errors excepted."""
+    return tuple(sorted(_READ))
 
 
 def shared_stems(names: Iterable[str]) -> list[str]:

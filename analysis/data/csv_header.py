@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from analysis.data.csv_columns import NEEDED, is_read
+from analysis.data.csv_columns import COLUMNS, NEEDED, is_read, read_names
 from analysis.data.csv_line import QuoteError, fields_of
-from analysis.data.text_file import TextFile, input_error
 from instrument.errors import InputError
-from instrument.text.quoting import printable
+from instrument.text.quoting import printable, shown
+from instrument.text.text_file import TextFile, input_error
 
 HEADER = "a header with theta_i_deg, theta_r_deg, dphi_deg, brdf and, where known, u_brdf"
 ROWS = "a row for each geometry"
 MAX_COLUMNS = 1000
+_OTHER_UNIT = re.compile(r"\bm?rad\b|%")  # a new name alone would not convert the values
+_YAML_LINE = re.compile(r"[A-Za-z_]+:(\s|\Z)")
+_GREEK = str.maketrans(
+    {"θ": "theta_", "ϑ": "theta_", "φ": "phi_", "ϕ": "phi_", "δ": "d", "ᵢ": "i", "ᵣ": "r"}
+)
 _SEPARATORS = {";": "';'", "\t": "tabs", " ": "spaces"}
 
 
@@ -27,9 +33,10 @@ class Header:
 
 
 def read_header(file: TextFile, rows: Iterator[tuple[int, str]]) -> Header:
-    """Read the header, the first of the file's rows; missing and duplicate columns are noted.
+    """Read the header, the first of the file's rows; duplicate columns are noted.
 
-    Raises `InputError` if there is no row, or its fields cannot be separated.
+    Raises `InputError` if there is no row, its fields cannot be separated, or a column is missing
+    or written in another way.
     """
     line, text = next(rows, (0, ""))
     if line == 0:
@@ -68,14 +75,44 @@ def _other_separator(text: str, names: list[str]) -> str | None:
 
 
 def _check_names(file: TextFile, line: int, names: list[str], starts: list[int]) -> None:
-    found = ", ".join(printable(name[:40]) or "''" for name in names[:20])
-    found += ", ..." if len(names) > 20 else ""
-    for column in NEEDED:
-        if column.name not in names:
-            what = f"{column.name}: the column is missing; found: {found}; allowed: {HEADER}"
-            file.note(line, 1, what)
+    missing = [column.name for column in NEEDED if column.name not in names]
+    renamed = _renamed(names)
+    if missing or renamed:
+        raise _refused(file, line, 1, _wrong_names(names, missing, renamed))
     for name in filter(is_read, dict.fromkeys(names)):
         places = [start for start, other in zip(starts, names, strict=True) if other == name]
         for place in places[1:]:
             what = f"{name}: duplicate column, first at column {places[0]}"
             file.note(line, place, f"{what}; keep one of them")
+
+
+def _wrong_names(names: list[str], missing: list[str], renamed: dict[str, str]) -> str:
+    """Missing columns, and the names to change; without any known name, what the line may be."""
+    if len(missing) == len(NEEDED) and not renamed and _YAML_LINE.match(names[0]):
+        return "header: the file looks like YAML, not like a table; `gonio plan` reads a protocol"
+    found = ", ".join(printable(name[:40]) or "''" for name in names[:20])
+    found += ", ..." if len(names) > 20 else ""
+    still = [name for name in missing if name not in renamed]
+    parts = [f"missing: {', '.join(still)}" if still else ""]
+    parts += [f"write {name} for {shown(given)}" for name, given in renamed.items()]
+    parts += [f"found: {found}" if still else "", f"allowed: {HEADER}"]
+    return f"header: {'; '.join(part for part in parts if part)}"
+
+
+def _renamed(names: list[str]) -> dict[str, str]:
+    """Given name by the name of a column that it means: in another case, or with a unit."""
+    meant = {_plain(name): name for name in read_names()}
+    meant |= {_plain(column.name.removesuffix("_deg")): column.name for column in COLUMNS}
+    found: dict[str, str] = {}
+    for given in names:
+        name = meant.get(_plain(given), given)
+        if name not in names and not _OTHER_UNIT.search(given):
+            found.setdefault(name, given)
+    return found
+
+
+def _plain(name: str) -> str:
+    """Name without case, unit in brackets, and separators; Greek letters by their names."""
+    text = re.sub(r"[(\[{].*?[)\]}]|[/°].*", " ", name.lower().translate(_GREEK))
+    words = re.sub(r"[\W_]+", " ", text).split()
+    return "".join(words[:-1] if words[-1:] == ["degrees"] else words)

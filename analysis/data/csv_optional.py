@@ -12,8 +12,8 @@ from analysis.data.csv_columns import Column
 from analysis.data.csv_header import Header
 from analysis.data.csv_line import column_of
 from analysis.data.measurements import SharedError
-from analysis.data.text_file import TextFile
 from instrument.geometry import FloatArray, IntArray
+from instrument.text.text_file import TextFile
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,8 +28,8 @@ from analysis.data.csv_header import ROWS, Header, read_header
 from analysis.data.csv_line import QuoteError, column_of, texts_of
 from analysis.data.csv_optional import OptionalColumns
 from analysis.data.measurements import Measurements, setting_numbers
-from analysis.data.text_file import TextFile, input_error, read_text
 from instrument.geometry import FloatArray
+from instrument.text.text_file import TextFile, input_error, read_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,18 +51,18 @@ def read_csv(path: Path) -> Measurements:
     return read_table(path).measurements
 
 
-def read_table(path: Path) -> CsvTable:
+def read_table(path: Path, *, repeats: bool = False) -> CsvTable:
     """Read a table; `u_random` is None if no u is stated, or u_brdf is empty in every row.
 
-    A row with the same three angles as an earlier one is a mistake. The same direction given by
-    other angles (theta_r = 0 at two dphi; -20, 0 and 20, 180) is another setting of the lamp, as
-    in a scan with several dphi, and is read. Where brdf is empty in every row, radiance over
-    cos(theta_i) is read, relative to an unknown level of each lamp setting.
-    Raises `InputError` with every mistake in the file; the first 20 are listed.
+    A row with the same three angles as an earlier one is a mistake, unless `repeats` allows it.
+    The same direction given by other angles (theta_r = 0 at two dphi; -20, 0 and 20, 180) is
+    another setting of the lamp, as in a scan with several dphi, and is read. Where brdf is empty in
+    every row, radiance over cos(theta_i) is read, relative to a level of each lamp setting.
+    Raises `InputError` with every mistake in the file; three of a kind are listed.
     """
     file = read_text(path, pipe=True)
     rows = file.rows()
-    table = _Table(file, read_header(file, rows))
+    table = _Table(file, read_header(file, rows), repeats)
     for line, text in rows:
         table.add(line, text)
     table.finish()
@@ -73,7 +73,7 @@ def read_table(path: Path) -> CsvTable:
 
 @dataclass(slots=True)
 class _Table:
-    """The rows below a header.
+    """The rows below a header; `repeats` allows several of one geometry.
 
     rows: a value for each of COLUMNS, NaN where none could be read. fields: line and texts of each
         of these rows.
@@ -84,6 +84,7 @@ class _Table:
 
     file: TextFile
     header: Header
+    repeats: bool
     rows: list[list[float]] = field(default_factory=list)
     fields: list[tuple[int, list[str]]] = field(default_factory=list)
     flagged: int = 0
@@ -109,9 +110,10 @@ class _Table:
         self.fields.append((line, fields))
         angles = (row[0], row[1], row[2])
         first = self.first_lines.setdefault(angles, line)
-        if first != line and not math.isnan(sum(angles)):
+        if first != line and not self.repeats and not math.isnan(sum(angles)):
             what = f"the same three angles as in line {first}"
-            self._note(line, "theta_i_deg", f"{what}; allowed: each geometry once")
+            allowed = "each geometry once; average repeats with their u: --repeats mean"
+            self._note(line, "theta_i_deg", f"{what}; allowed: {allowed}")
 
     def _note_width(self, line: int, text: str, width: int) -> None:
         what = f"row: {width} {'field' if width == 1 else 'fields'}; allowed: {self.header.width}"

@@ -25,10 +25,10 @@ import numpy as np
 
 from analysis.data.csv_columns import BRDF
 from analysis.data.measurements import Measurements
-from analysis.data.text_file import TextFile, input_error, parse_number, read_text
 from instrument.errors import InputError
 from instrument.geometry import FloatArray
 from instrument.text.quoting import printable, shown
+from instrument.text.text_file import TextFile, input_error, parse_number, read_text
 
 TABLE, VALUES = "table.txt", "abrdf.dat"
 

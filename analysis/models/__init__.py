@@ -8,6 +8,7 @@ modules, and those in `rough`, `smooth` and `specular`, hold the formulas.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
 from functools import cache
 
 from analysis.models.base import Model, Parameter, add
@@ -65,8 +66,10 @@ def _named(name: str) -> Model:
     parts = name.split("+")
     unknown = [part for part in parts if part not in _SINGLE]
     if unknown:
+        near = get_close_matches(unknown[0].lower().replace("-", "_"), _SINGLE, n=1)
+        meant = f"did you mean {near[0]}? " if near else ""
         raise KeyError(
-            f"unknown model {unknown[0]!r} in {name!r}; known: {', '.join(_SINGLE)}, "
+            f"unknown model {unknown[0]!r} in {name!r}; {meant}known: {', '.join(_SINGLE)}, "
             "and their sums, written with +"
         )
     if len(set(parts)) < len(parts):

@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from pydantic import ValidationError
 
+from instrument.config.file_role import wrong_role
 from instrument.config.protocol import Protocol
 from instrument.config.protocol_checks import ModelCheck, own_mistakes, rig_mistakes
 from instrument.config.rig import Rig
@@ -42,7 +43,7 @@ class Loaded:
 
 def load_rig(path: Path) -> Rig:
     """Read a rig file. Raises `InputError` with every mistake in it."""
-    file = _File(path, read_yaml(yaml_bytes(path)))
+    file = _read(path, Rig)
     rig = file.check(Rig)
     if rig is None or file.found:
         raise InputError(*_report(file))
@@ -58,7 +59,7 @@ def load_protocol(
     parameters are None if the protocol only names the model. Raises `InputError` with every mistake
     in either file and between them.
     """
-    file = _File(path, read_yaml(yaml_bytes(path)))
+    file = _read(path, Protocol)
     protocol = file.check(Protocol)
     for at, text in own_mistakes(file.marked, check_model):
         file.add(at, text)
@@ -80,11 +81,20 @@ def load_protocol(
     )
 
 
+def _read(path: Path, role: type[Section]) -> _File:
+    """Read a file. Raises `InputError` if it is none of that role."""
+    file = _File(path, read_yaml(yaml_bytes(path)))
+    text = wrong_role(file.marked.data, role) if file.marked.readable else None
+    if text is not None:
+        raise InputError(f"{file.name}: {text}")
+    return file
+
+
 def _rig_file(protocol: _File, rig_path: Path | None) -> _File | None:
     """Return the rig's file, or None, with a mistake added, if the named one cannot be read."""
     if rig_path is not None:
         try:
-            return _File(rig_path, read_yaml(yaml_bytes(rig_path)))
+            return _read(rig_path, Rig)
         except InputError as error:
             raise InputError(*_report(protocol), *error.problems) from None
     named = protocol.marked.get(("rig",))
@@ -95,7 +105,7 @@ def _rig_file(protocol: _File, rig_path: Path | None) -> _File | None:
     try:
         # After a linked folder, ".." is not the folder that it seems to be.
         path = plain if plain.exists() or not path.exists() else path
-        return _File(path, read_yaml(yaml_bytes(path)))
+        return _read(path, Rig)
     except InputError as error:
         protocol.add(("rig",), error.problems[0])
     except (OSError, ValueError):

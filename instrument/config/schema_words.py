@@ -92,7 +92,7 @@ class Explanation:
 
     def _wrong_value(self, path: KeyPath, kind: str) -> None:
         value, node = self._marked.get(path), self._node(path)
-        hint = _hint(value, self._options(node))
+        hint = _hint(value, self._options(node), path)
         text = f"{_given(value, kind)}; allowed: {self._words(node)}"
         self._add(path, f"{text} ({hint})" if hint else text)
 
@@ -148,11 +148,11 @@ class Explanation:
             keys = node.get("properties") or node.get("propertyNames", {}).get("enum")
             one = "blocks" if many else "a block"
             return one + (f" with {', '.join(keys)}" if keys else " of names and numbers")
-        if kind == "string" and "description" in node:
-            return str(node["description"])
         if kind == "string":
             length = f" of 1 to {node['maxLength']} characters" if "maxLength" in node else ""
-            return ("texts" if many else "text") + length
+            return str(node.get("description", ("texts" if many else "text") + length))
+        if kind == "boolean":
+            return "true or false"
         number = "whole number" if kind == "integer" else "number"
         return (f"{number}s" if many else f"a {number}") + _range(node)
 
@@ -177,6 +177,12 @@ _TOO = {
 }
 
 
+_UNITS = ("_deg", "_mm", "_um", "_nm", "_s", "_sr", "_px")  # at the end of a key
+# Words for true and false in YAML 1.1 and elsewhere.
+_TRUTH = dict.fromkeys(("true", "yes", "y", "on", "1"), "true")
+_TRUTH |= dict.fromkeys(("false", "no", "n", "off", "0"), "false")
+
+
 def _range(node: Mapping[str, Any]) -> str:
     low, high = node.get("minimum"), node.get("maximum")
     above, below = node.get("exclusiveMinimum"), node.get("exclusiveMaximum")
@@ -199,11 +205,15 @@ def _given(value: object, kind: str) -> str:
     return f"{shown(value)} is {kind_of(value)}{' by the rules of YAML' if rule else ''}"
 
 
-def _hint(value: object, options: list[dict[str, Any]]) -> str | None:
+def _hint(value: object, options: list[dict[str, Any]], path: KeyPath) -> str | None:
     """Return advice on what to write instead, if the value suggests any."""
     forms = {node.get("type"): node for node in options}
     if "number" in forms or "integer" in forms:
-        return _number_instead(value, whole="number" not in forms)
+        unit_in_key = any(str(key).endswith(_UNITS) for key in path)
+        return _number_instead(value, whole="number" not in forms, unit_in_key=unit_in_key)
+    if "boolean" in forms:
+        word = _TRUTH.get(str(value).strip().lower())
+        return f"write {word}" if word else None
     if "array" in forms:
         item = forms["array"]["items"].get("type")
         fits = is_number(value) if item == "number" else isinstance(value, str) and item == "string"
@@ -215,9 +225,9 @@ def _hint(value: object, options: list[dict[str, Any]]) -> str | None:
     return f"write '{shown(value)}', in quotes" if "string" in forms and is_word else None
 
 
-def _number_instead(value: object, *, whole: bool) -> str | None:
+def _number_instead(value: object, *, whole: bool, unit_in_key: bool) -> str | None:
     if isinstance(value, str):
-        return number_hint(value, whole=whole)
+        return number_hint(value, whole=whole, unit_in_key=unit_in_key)
     if whole and isinstance(value, float) and value.is_integer():
         return f"write {value:.0f}"
     return None

@@ -8,13 +8,18 @@ from pathlib import Path
 from instrument.config.yaml_positions import MAX_BYTES
 from instrument.errors import InputError
 from instrument.text.atomic_file import read_file
+from instrument.text.file_kind import foreign_kind
 from instrument.text.quoting import printable
 
 
 def yaml_bytes(path: Path) -> bytes:
     """Return the bytes of a file, at most one more than MAX_BYTES. Raises `InputError`."""
     try:
-        return read_file(path, MAX_BYTES)
+        raw = read_file(path, MAX_BYTES)
+        kind = foreign_kind(raw)
+        if kind is None:
+            return raw
+        problem = f"is {kind.name}; allowed: a YAML file; {_suggestion(path)}"
     except FileNotFoundError:
         problem = f"no such file; {_suggestion(path)}"
     except IsADirectoryError:

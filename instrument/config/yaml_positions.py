@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
 
@@ -140,8 +141,11 @@ def plain_value(text: str) -> object:
     return float(text) if _DECIMAL.fullmatch(text) else text
 
 
-def number_hint(text: str, *, whole: bool = False) -> str | None:
-    """Return advice on how to write the number that `text` seems to mean; None if it is none."""
+def number_hint(text: str, *, whole: bool = False, unit_in_key: bool = True) -> str | None:
+    """Return advice on how to write the number that `text` seems to mean; None if it is none.
+
+    unit_in_key: the name of the key ends with a unit; one without takes a fraction for per cent.
+    """
     text = text.strip()
     if len(text) > _MAX_NUMBER:
         return None
@@ -152,13 +156,18 @@ def number_hint(text: str, *, whole: bool = False) -> str | None:
     if re.fullmatch(r"[-+]?0([xX][0-9a-fA-F]+|[oO][0-7]+|[bB][01]+)", text):
         return f"write {int(text, 0)}"
     number = _LOOKS.fullmatch(text)
-    if number is None:
-        return None
-    unit = ": the unit is in the key's name" if number["unit"] else ""
-    value = _decimal(number)
+    return None if number is None else _without_unit(number, whole, unit_in_key)
+
+
+def _without_unit(number: re.Match[str], whole: bool, unit_in_key: bool) -> str:
+    value, unit = _decimal(number), (number["unit"] or "").strip()
+    if unit == "%":
+        fraction = f"{Decimal(value) / 100:f}"
+        return "write it in the unit of the key" if unit_in_key else f"write {fraction}, not in %"
     if whole and float(value).is_integer() and len(value) < 20:
         value = f"{float(value):.0f}"
-    return f"write {value}{unit}"
+    in_key = ": the unit is in the key's name" if unit_in_key else f", without {unit}"
+    return f"write {value}{in_key if unit else ''}"
 
 
 def _decimal(number: re.Match[str]) -> str:

@@ -67,7 +67,7 @@ class Record(Closeable):
         _require_support(folder)
         path = folder / FILE_NAME
         if not path.is_file():
-            raise InputError(f"{folder}: no {FILE_NAME} there: name the folder of a run")
+            raise InputError(f"{folder}: {_no_run(folder)}")
         check_files(folder, FILE_NAME, LOCK_NAME)
         with ExitStack() as on_failure:
             try:
@@ -298,6 +298,15 @@ def _explain(error: OSError | sqlite3.Error, folder: Path) -> str:
     if name.startswith(_NOT_PERMITTED):
         return f"cannot be written ({error}): look at the folder's permissions and its disk"
     return f"cannot be written ({error}): look at the disk"
+
+
+def _no_run(path: Path) -> str:
+    """Return that a path is no run's folder, and which one may be meant."""
+    if (path.parent / FILE_NAME).is_file():
+        return f"is a file of a run; name the run's folder: {path.parent}"
+    if path.is_file():
+        return "is a file; name the folder of a run"
+    return f"no {FILE_NAME} there: name the folder of a run"
 
 
 def _require_support(folder: Path) -> None:

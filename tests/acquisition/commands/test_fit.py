@@ -126,7 +126,7 @@ def test_too_few_points_for_any_fit_end_with_5_and_their_json(tmp_path: Path) ->
         (HEADER + "95,0,0,0.2,0.1\n", ":2:1: theta_i_deg: 95 deg; allowed: a number from 0 to 90"),
         (HEADER + "30,0,0,nan,0.1\n", ":2:8: brdf: 'nan' is not finite"),
         (HEADER + 2 * "30,0,0,0.2,0.1\n", ":3:1: theta_i_deg: the same three angles"),
-        ("theta_i_deg,theta_r_deg,brdf\n30,0,0.2\n", ":1:1: dphi_deg: the column is missing"),
+        ("theta_i_deg,theta_r_deg,brdf\n30,0,0.2\n", ":1:1: header: missing: dphi_deg; found"),
         ("", ":1:1: the file is empty"),
     ],
 )

@@ -3,8 +3,18 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from tests.support.analysis.csv_texts import BARE, HEADER, PLAIN, assert_mistake, changed, problems
+from tests.support.analysis.csv_texts import (
+    BARE,
+    HEADER,
+    NAMES,
+    PLAIN,
+    assert_mistake,
+    changed,
+    problems,
+)
 
 # Table, text to replace, replacement, and the whole message, with positions counted by hand.
 MISTAKES = {
@@ -48,26 +58,45 @@ def test_a_mistake_in_the_header_is_reported_with_its_position(kind: str) -> Non
     assert_mistake(*MISTAKES[kind])
 
 
-def test_a_missing_column_is_reported_with_the_names_found() -> None:
-    """A comma too many in the header also makes both rows too short."""
-    found = problems(changed(BARE, "dphi_deg", "phi,"))
-    assert [line[: len("data.csv:2:16")] for line in found[1:]] == [
-        "data.csv:2:16",
-        "data.csv:3:13",
-    ]
-    assert all(": row: 4 fields; allowed: 5" in line for line in found[1:])
-    assert found[0] == (
-        "data.csv:1:1: dphi_deg: the column is missing; found: theta_i_deg, theta_r_deg, phi, '', "
-        f"brdf; allowed: {HEADER}"
+def test_missing_columns_are_named_in_one_message_with_the_names_found() -> None:
+    """The rows are not read: without its columns, a row means nothing."""
+    assert problems(changed(BARE, "dphi_deg", "azimuth,")) == (
+        "data.csv:1:1: header: missing: dphi_deg; found: theta_i_deg, theta_r_deg, azimuth, '', "
+        f"brdf; allowed: {HEADER}",
     )
-
-
-def test_missing_columns_are_all_named() -> None:
-    found = problems("theta_i_deg,\x1b[31m\n30,\n")
-    assert [line.split(":")[3] for line in found] == [" theta_r_deg", " dphi_deg", " brdf"]
-    assert all(r"found: theta_i_deg, '\x1b[31m'; allowed:" in line for line in found)
+    (found,) = problems("theta_i_deg,\x1b[31m\n30,\n")
+    assert r"missing: theta_r_deg, dphi_deg, brdf; found: theta_i_deg, '\x1b[31m'; allowed" in found
     wide = ",".join(f"c{n}" for n in range(30))
     assert "c18, c19, ...; allowed" in problems(wide)[0]
+
+
+CASES = st.sampled_from([str.lower, str.upper, str.title, str.swapcase])
+SEPARATORS = st.sampled_from(["_", " ", "-", ".", ""])
+ANGLE_UNITS = st.sampled_from(["_deg", " (deg)", " [°]", " / °", "", "_Degrees"])
+
+
+@given(st.data())
+def test_a_name_in_another_form_is_answered_with_the_one_to_write(data: st.DataObject) -> None:
+    """Never taken silently, never ignored: a U_BRDF that is ignored would change every u."""
+    for name in NAMES:
+        stem = name.removesuffix("_deg")
+        unit = (
+            data.draw(ANGLE_UNITS) if stem != name else data.draw(st.sampled_from(["", " (1/sr)"]))
+        )
+        other = data.draw(CASES)(stem.replace("_", data.draw(SEPARATORS))) + unit
+        if other != name:
+            (found,) = problems(
+                PLAIN.replace(name, other, 1) if name != "brdf" else PLAIN.replace("brdf", other, 1)
+            )
+            assert f"write {name} for {other!r}" in found
+
+
+@pytest.mark.parametrize("name", ["theta_i (rad)", "Theta_I [mrad]", "theta_i_rad"])
+def test_an_angle_in_radians_is_missing(name: str) -> None:
+    """A new name would not convert the values."""
+    (found,) = problems(changed(BARE, "theta_i_deg", name))
+    assert "missing: theta_i_deg" in found
+    assert "write theta_i_deg" not in found
 
 
 def test_a_line_of_commas_alone_is_refused_at_once() -> None:

@@ -217,7 +217,8 @@ MISTAKES = {
         BARE,
         "30,10,0,0.24",
         " 3e1,-20.50,-0,0.24",
-        "3:2: theta_i_deg: the same three angles as in line 2; allowed: each geometry once",
+        "3:2: theta_i_deg: the same three angles as in line 2; allowed: each geometry once;"
+        " average repeats with their u",
     ),
 }
 
@@ -270,7 +271,7 @@ def test_all_mistakes_are_reported_at_once_by_position() -> None:
         "data.csv:6:1: theta_i_deg",
         "data.csv:7:6: row",
     ]
-    assert found[-2].endswith("as in line 5; allowed: each geometry once")
+    assert "as in line 5; allowed: each geometry once; average repeats" in found[-2]
 
 
 ANGLE = st.floats(0, 90)

@@ -1,5 +1,6 @@
 """Loading protocols with their rigs: which files are read, what is returned, what is reported."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -72,6 +73,44 @@ def test_a_very_long_list_of_mistakes_is_cut_and_counted() -> None:
     found = problems(protocol)
     assert len(found) == MAX_REPORTED + 1
     assert "800 more mistakes from here on" in found[-1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "given", "words"),
+    [
+        ("0.7", "0.7\nkeep_frames: yes", "yes", "allowed: true or false (write true)"),
+        ("0.7", "0.7\nkeep_frames: 'off'", "'off'", "allowed: true or false (write false)"),
+        (
+            "target: 0.7",
+            "target: 70%",
+            "70%",
+            "and less than 1 (write 0.7, not in %)",
+        ),
+        ("nce: 0.005", "nce: 0.5 %", "0.5 %", "a number, at least 0 (write 0.005, not in %)"),
+        (
+            "{width_mm: 20.0",
+            "{width_mm: 20 mm",
+            "20 mm",
+            "(write 20: the unit is in the key's name)",
+        ),
+        ("[30, 45.0", "[30°, 45.0", "30°", "(write 30: the unit is in the key's name)"),
+    ],
+)
+def test_a_value_in_an_everyday_form_is_answered_with_the_one_to_write(
+    old: str, new: str, given: str, words: str
+) -> None:
+    """The advised value is accepted in its place."""
+    (found,) = problems(changed(PROTOCOL, old, new))
+    assert found.endswith(words)
+    (advised,) = re.findall(r"write ([0-9.]+|true|false)", words)
+    load(changed(PROTOCOL, old, new.replace(given, advised)))
+
+
+def test_no_value_is_advised_where_none_can_be_known() -> None:
+    (found,) = problems(changed(PROTOCOL, "0.7", "0.7\nkeep_frames: maybe"))
+    assert found.endswith("'maybe' is text; allowed: true or false")
+    (found,) = problems(changed(PROTOCOL, "{width_mm: 20.0", "{width_mm: 40 %"))
+    assert found.endswith("greater than 0 (write it in the unit of the key)")
 
 
 def test_a_rig_given_by_hand_overrides_the_named_one() -> None:

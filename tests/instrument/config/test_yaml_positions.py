@@ -105,6 +105,20 @@ def test_number_hint(text: str, hint: str | None) -> None:
     assert number_hint(text) == hint
 
 
+@pytest.mark.parametrize(
+    ("text", "in_key", "without"),
+    [
+        ("70%", "write it in the unit of the key", "write 0.7, not in %"),
+        ("0,5 %", "write it in the unit of the key", "write 0.005, not in %"),
+        ("-3 %", "write it in the unit of the key", "write -0.03, not in %"),
+        ("12 mm", "write 12: the unit is in the key's name", "write 12, without mm"),
+    ],
+)
+def test_number_hint_with_a_unit(text: str, in_key: str, without: str) -> None:
+    assert number_hint(text) == in_key
+    assert number_hint(text, unit_in_key=False) == without
+
+
 def test_number_hint_for_a_whole_number() -> None:
     assert number_hint("1e5", whole=True) == "write 100000"
 

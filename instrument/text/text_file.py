@@ -7,18 +7,22 @@ is allowed`. Lines and columns count from 1, columns in characters.
 from __future__ import annotations
 
 import math
+import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from instrument.errors import InputError
 from instrument.text.atomic_file import read_file
+from instrument.text.file_kind import foreign_kind, json_kind
 from instrument.text.quoting import printable, shown
 
 MAX_BYTES = 64 * 1024**2  # about 150 000 rows of a run's measurements.csv
 MAX_LINES = 2_000_000
 MAX_LINE = 1024**2  # characters; a thousand columns need about 20 000
 MAX_REPORTED = 20
+MAX_ALIKE = 3  # mistakes of one kind that are listed: an export repeats them in every row
 MAX_NOTED = 10_000  # with more mistakes the rest of the file is not read
 
 
@@ -44,26 +48,39 @@ class TextFile:
 
 
 def input_error(*files: TextFile) -> InputError:
-    """Error that lists the mistakes of all files by position, at most MAX_REPORTED of them."""
-    lines = [
-        f"{file.name}:{line}:{column}: {text}"
-        for file in files
-        for line, column, text in sorted(file.mistakes, key=lambda mistake: mistake[:2])
-    ]
-    more = len(lines) - MAX_REPORTED
+    """Error that lists the mistakes of all files by position: MAX_ALIKE of a kind, then a count."""
+    lines: list[str] = []
+    more = Counter[str]()
+    for file in files:
+        seen: dict[str, list[str]] = {}
+        for line, column, text in sorted(file.mistakes, key=lambda mistake: mistake[:2]):
+            place, alike = f"{file.name}:{line}:{column}", seen.setdefault(_kind_of(text), [])
+            if len(alike) < MAX_ALIKE and len(lines) < MAX_REPORTED:
+                lines.append(f"{place}: {text}")
+                alike.append(place)
+            else:
+                more[f"like {alike[-1]}" if alike else "of other kinds"] += 1
     least = "at least " if any(len(file.mistakes) >= MAX_NOTED for file in files) else ""
-    tail = [f"... and {least}{more} more"] if more > 0 else []
-    return InputError(*lines[:MAX_REPORTED], *tail)
+    tail = [f"... and {least}{count} more {words}" for words, count in more.most_common()]
+    return InputError(*lines, *tail)
+
+
+def _kind_of(text: str) -> str:
+    """Kind of a mistake: its column, and what is allowed there, whatever the numbers."""
+    return re.sub(r"[0-9]+", "0", f"{text.partition(':')[0]}{text.rpartition('allowed:')[2]}")
 
 
 def read_text(path: Path, *, pipe: bool = False) -> TextFile:
     """Read a UTF-8 file (with or without a byte order mark, lines ending in LF, CRLF or CR).
 
-    `pipe` allows a pipe. Raises `InputError` for a file that cannot be opened, is not UTF-8 text,
-    or exceeds MAX_BYTES, MAX_LINES or MAX_LINE.
+    `pipe` allows a pipe. Raises `InputError` for a file that cannot be opened, is of another kind
+    (a workbook, a web page), is not UTF-8 text, or exceeds MAX_BYTES, MAX_LINES or MAX_LINE.
     """
     name = printable(str(path))
     raw = _bytes(path, name, pipe).removeprefix(b"\xef\xbb\xbf")
+    kind = foreign_kind(raw) or json_kind(raw)
+    if kind is not None:
+        raise InputError(f"{name}: is {kind.name}; allowed: a table as text (CSV); {kind.advice}")
     count = 1 + raw.count(b"\n") + raw.count(b"\r") - raw.count(b"\r\n")
     if count > MAX_LINES:
         raise InputError(f"{name}: {count} lines; allowed: {MAX_LINES}; split it")

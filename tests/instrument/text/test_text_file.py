@@ -7,18 +7,28 @@ from pathlib import Path
 
 import pytest
 
-from analysis.data import text_file
 from analysis.data.csv_table import read_csv
 from instrument.errors import InputError
+from instrument.text import text_file
 from tests.support.analysis.csv_texts import BARE, problems, read
 
 
-def test_no_more_than_twenty_mistakes_are_reported() -> None:
+def test_three_mistakes_of_a_kind_are_listed_and_the_others_counted() -> None:
     rows = "".join(f"{n},0,0,x\n" for n in range(21))
     found = problems("theta_i_deg,theta_r_deg,dphi_deg,brdf\n" + rows)
-    assert [line.split(":")[1] for line in found[:-1]] == [str(n) for n in range(2, 22)]
-    assert found[-1] == "... and 1 more"
-    assert len(problems("theta_i_deg,theta_r_deg,dphi_deg,brdf\n" + rows[:-9])) == 20
+    assert [line.split(":")[1] for line in found[:-1]] == ["2", "3", "4"]
+    assert found[-1] == "... and 18 more like data.csv:4:7"
+    other = problems("theta_i_deg,theta_r_deg,dphi_deg,brdf\n" + rows + "95,0,0,1\n")
+    assert other[3].startswith("data.csv:23:1: theta_i_deg: 95 deg")  # the only one of its kind
+    assert other[-1] == found[-1]
+
+
+def test_no_more_than_twenty_mistakes_are_listed() -> None:
+    names = [f"u_shared_e{n * 'x'}_relative" for n in range(21)]
+    header = ",".join(["theta_i_deg,theta_r_deg,dphi_deg,brdf", *names])
+    found = problems(f"{header}\n30,0,0,.2{21 * ',x'}\n")
+    assert len(found) == 20 + 1
+    assert found[-1] == "... and 1 more of other kinds"
 
 
 @pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
@@ -32,7 +42,7 @@ def test_text_that_is_not_utf_8(mark: bytes, end: bytes) -> None:
 
 
 def test_a_table_in_utf_16_is_not_guessed() -> None:
-    assert problems(BARE.encode("utf-16"))[0].startswith("data.csv:1:1: byte 0xff is not UTF-8")
+    assert problems(BARE.encode("utf-16"))[0].startswith("data.csv: is text in UTF-16; allowed")
 
 
 def test_a_file_that_cannot_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
