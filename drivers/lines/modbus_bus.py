@@ -10,7 +10,6 @@ ends motion, are ever sent twice.
 from __future__ import annotations
 
 import logging
-import math
 import struct
 import termios
 from collections.abc import Callable, Sequence
@@ -21,7 +20,15 @@ from pymodbus.exceptions import ModbusException, ModbusIOException
 
 from drivers.lines.modbus_client import BusSettings, Client, client_for
 from drivers.lines.priority_lock import PriorityLock
-from drivers.lines.serial_line import Garbled, NoReply, PortGone
+from drivers.lines.serial_line import (
+    BY_ID,
+    REOPEN_EVERY_S,
+    REOPEN_S,
+    Garbled,
+    NoReply,
+    PortGone,
+    names_one_device,
+)
 from instrument.clock import Clock
 from instrument.closeable import Closeable
 from instrument.errors import DeviceError
@@ -65,7 +72,10 @@ log = logging.getLogger(__name__)
 
 
 class ModbusBus(Closeable):
-    """An open line: one exchange at a time, urgent ones first."""
+    """An open line: one exchange at a time, urgent ones first.
+
+    `losses`: number of times the port was lost.
+    """
 
     def __init__(self, who: str, settings: BusSettings, clock: Clock) -> None:
         self.settings, self.port, self.clock = settings, settings.port, clock
@@ -73,6 +83,7 @@ class ModbusBus(Closeable):
         self._tcp = settings.port.startswith("tcp://")
         self._client = client_for(settings, clock)
         self._gone, self._closed = "", False
+        self._follows_device, self.losses = names_one_device(self.port), 0
         self._active_s = clock.now_s()
         self.open(who)
 
@@ -81,15 +92,21 @@ class ModbusBus(Closeable):
         self._closed = True
         self._close_client()
 
-    def open(self, who: str) -> None:
-        """Open the port unless it is open; reconnect to a gateway that has hung up.
+    @property
+    def closed(self) -> bool:
+        """True once the program has closed the line."""
+        return self._closed
 
-        A lost serial port stays lost: another device may have been given its name.
+    def open(self, who: str, at_any_path: bool = False) -> None:
+        """Open the port unless it is open; one that was lost, if its path names one device.
+
+        A numbered name may belong to another device by then: it is opened again for a stop only.
         """
-        if self._closed or (self._gone and not self._tcp):
-            raise self._lost(who, self._gone or "it was closed")
+        if self._closed or (self._gone and not (self._follows_device or at_any_path)):
+            raise self._port_gone(who, "it was closed" if self._closed else self._gone)
         try:
             self._client.connect()
+            self._gone = "" if self._follows_device else self._gone
         except (OSError, ValueError, termios.error) as error:
             look = _CHECK_GATEWAY if self._tcp else _CHECK_PORT
             raise PortGone(f"{who}: cannot open {self.port}: {error}: {look}") from error
@@ -102,9 +119,9 @@ class ModbusBus(Closeable):
             self._active_s = self.clock.now_s()
         return left_s <= 0
 
-    def exchange(self, who: str, action: Callable[[Client], T]) -> T:
+    def exchange(self, who: str, action: Callable[[Client], T], a_stop: bool = False) -> T:
         """Send one request and return its answer; the caller holds the lock."""
-        self.open(who)
+        self.open(who, at_any_path=a_stop)
         client, active_s = self._client, self._active_s
         if not self._tcp:
             self.clock.sleep(active_s + SILENCE_S - self.clock.now_s())
@@ -131,6 +148,11 @@ class ModbusBus(Closeable):
 
     def _no_answer(self, who: str) -> DeviceError:
         received, within_s = self._client.received, self.settings.reply_s
+        if received and received == getattr(self._client, "sent", b""):
+            return NoReply(
+                f"{who}: no answer within {within_s:g} s, only the echo of the request: look at "
+                f"its power, at its unit address and at the cable behind the adapter of {self.port}"
+            )
         if received:
             return Garbled(
                 f"{who}: no whole answer within {within_s:g} s, only {received[:40].hex(' ')} hex: "
@@ -142,10 +164,14 @@ class ModbusBus(Closeable):
         )
 
     def _lost(self, who: str, why: str) -> PortGone:
-        self._gone = self._gone or why
+        self._gone, self.losses = self._gone or why, self.losses + 1
         self._close_client()
+        return self._port_gone(who, why)
+
+    def _port_gone(self, who: str, why: str) -> PortGone:
         return PortGone(
-            f"{who}: {self.port} is gone ({why}): look at its plug and its power, then go on"
+            f"{who}: {self.port} is gone ({why}): look at its plug and its power"
+            f"{'' if self._follows_device else BY_ID}, then go on"
         )
 
 
@@ -163,6 +189,7 @@ class ModbusUnit:
         self.where = f"{bus.port}, unit {unit}"
         self._known, self._counts = known_register, cycle(resync_counts)
         self._last_error: DeviceError | None = None
+        self._losses = bus.losses
         self._out_of_step = True  # an earlier user of the line may have left an answer on it
 
     def deadline_s(self) -> float:
@@ -204,20 +231,32 @@ class ModbusUnit:
     def write_at_once(self, register: int, value: int) -> None:
         """Write one register before all queued exchanges, even if the device is out of step.
 
-        It is sent up to three times, until it is acknowledged: only for what is safe to repeat.
+        It is sent up to three times, until it is acknowledged, and for up to `REOPEN_S` over a port
+        that comes back: only for what is safe to repeat.
         """
 
-        def send() -> None:
-            with self._bus.lock.hold(urgent=True):
-                self._write_one(register, value)
-
-        self._retried(send)
+        until_s, tries_left = self._bus.clock.now_s() + REOPEN_S, TRIES
+        while True:
+            try:
+                with self._bus.lock.hold(urgent=True):
+                    return self._write_one(register, value)
+            except PortGone:
+                if self._bus.closed or self._bus.clock.now_s() > until_s:
+                    raise
+                self._bus.clock.sleep(REOPEN_EVERY_S)
+            except AnswerLost as lost:
+                log.warning("%s", lost)
+                tries_left -= 1
+                if not tries_left:
+                    raise
 
     def _in_step(self, action: Callable[[], T], until_s: float) -> T:
         """Resynchronise if necessary, then act; the lock is released after every step."""
         late_answers = 0
         while True:
             with self._bus.lock.hold():
+                if self._losses != self._bus.losses:
+                    self._losses, self._out_of_step = self._bus.losses, True
                 if not self._out_of_step:
                     return action()
                 if self._bus.clock.now_s() > until_s:
@@ -254,11 +293,12 @@ class ModbusUnit:
             register,
             _WRITE_ONE,
             lambda c: c.write_register(register, value, device_id=self._unit),
+            a_stop=True,
         )
         if (reply.address, reply.registers) != (register, [value]):
             raise self._garbled(f"register {reply.address:04X} hex, {reply.registers}")
 
-    def _retried(self, action: Callable[[], T], until_s: float = math.inf) -> T:
+    def _retried(self, action: Callable[[], T], until_s: float) -> T:
         """Return the result of up to three tries, none of them begun after `until_s`."""
         for tries_left in reversed(range(TRIES)):
             try:
@@ -270,11 +310,15 @@ class ModbusUnit:
         raise NoReply(f"{self._who}: not asked")  # TRIES is not 0
 
     def _exchange(
-        self, register: int, function: int, action: Callable[[Client], ModbusPDU]
+        self,
+        register: int,
+        function: int,
+        action: Callable[[Client], ModbusPDU],
+        a_stop: bool = False,
     ) -> ModbusPDU:
         out_of_step, self._out_of_step = self._out_of_step, True
         try:
-            reply = self._bus.exchange(self._who, action)
+            reply = self._bus.exchange(self._who, action, a_stop)
         except AnswerLost as lost:
             self._last_error = lost
             raise

@@ -15,13 +15,15 @@ from urllib.parse import urlsplit
 
 import serial
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
-from pymodbus.exceptions import ConnectionException
+from pymodbus.exceptions import ConnectionException, ModbusIOException
 
-from drivers.lines.serial_line import REPLY_S, WRITE_S
+from drivers.lines.serial_line import ECHO, REPLY_S, WRITE_S
 from instrument.clock import Clock
 from instrument.errors import InputError
 
+READ = b"\x03"  # function code: read holding registers
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # errors are raised, not printed
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +71,16 @@ class _DeadlineClient:
 
 
 class SerialClient(_DeadlineClient, ModbusSerialClient):
-    """Modbus RTU over a serial port."""
+    """Modbus RTU over a serial port.
+
+    A two-wire adapter may return each request. Only the answer to a read can be told from its
+    request, so reads show whether there is an echo: an echoed write looks like its answer.
+    """
+
+    echoes = False
+    sent = b""
+    _held = b""
+    _may_be_echo = False
 
     def connect(self) -> bool:
         """Open the port unless it is open; raise the system's error if that fails."""
@@ -80,6 +91,34 @@ class SerialClient(_DeadlineClient, ModbusSerialClient):
                 write_timeout=WRITE_S, exclusive=True,
             )  # fmt: skip
         return True
+
+    def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
+        """Send a request; a line that does not take it is as one that does not answer."""
+        del addr  # of a datagram
+        self.sent, self._held = request, b""
+        self._may_be_echo = self.echoes or request[1:2] == READ
+        try:
+            return int(self.socket.write(request) or 0)
+        except serial.SerialTimeoutException as error:
+            raise ModbusIOException(f"not taken within {WRITE_S:g} s") from error
+
+    def recv(self, size: int | None) -> bytes:
+        """Return the bytes that arrive before the deadline, without the echo of the request."""
+        while data := super().recv(size):
+            answer = self._without_echo(data) if self._may_be_echo else data
+            if answer:
+                return answer
+        return b""
+
+    def _without_echo(self, data: bytes) -> bytes:
+        self._held += data
+        if not self._held.startswith(self.sent) and self.sent.startswith(self._held):
+            return b""  # perhaps the beginning of an echo
+        self._may_be_echo, echo = False, self._held.startswith(self.sent)
+        if echo and not self.echoes:
+            log.warning("%s %s", self.comm_params.host, ECHO)
+        self.echoes = echo
+        return self._held[len(self.sent) :] if echo else self._held
 
     def _read(self, port: Any) -> bytes:
         return bytes(port.read(port.in_waiting or 1))

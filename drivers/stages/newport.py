@@ -14,6 +14,9 @@ from instrument.clock import Clock
 from instrument.errors import DeviceError
 
 BAUDRATE = {"SMC100": 57600, "CONEX-CC": 921600}
+# First words of the answer to VE. Two laboratories' notes quote "SMC_CC - Controller-driver version
+# 3. 1. 2" of an SMC100CC and SMC_PP of the stepper version; several quote "CONEX-CC 2.0.1".
+NAMES = {"SMC100": ("SMC_CC", "SMC_PP"), "CONEX-CC": ("CONEX-CC",)}
 log = logging.getLogger(__name__)
 
 _TRIES = 3
@@ -26,12 +29,13 @@ class NewportPort:
     """One controller, by its address on a line that others may share.
 
     Answers carry no number, so one is trusted only on a clean line. After a time-out the input is
-    drained, and the controller must report the same version as when it was opened.
+    drained, and the controller must report the same version as when it was opened; after the port
+    was gone, also the same stage.
     """
 
     def __init__(self, line: Line, address: int, who: str) -> None:
         self.line, self.address, self.who = line, address, who
-        self.version = ""
+        self.version, self.stage, self._openings = "", "", line.openings
         self.version = self.query("VE", str)
 
     def query(
@@ -52,8 +56,8 @@ class NewportPort:
         """
         with self.line.lock.hold():
             self._clean()
-            self.line.write(framing.command(self.address, letters, value))
             try:
+                self.line.write(framing.command(self.address, letters, value))
                 letter = self._query_once("TE", str, "")
             except (NoReply, Garbled) as error:
                 log.warning("%s; %s may or may not have been taken", error, letters)
@@ -66,7 +70,7 @@ class NewportPort:
 
     def stop(self) -> None:
         """Stop this axis, without the lock: ST has no answer, and the line is full duplex."""
-        self.line.write(framing.command(self.address, "ST"))
+        self.line.write_at_once(framing.command(self.address, "ST"))
 
     def _query_once(self, letters: str, parse: Callable[[str], T], value: str) -> T:
         self._clean()
@@ -85,16 +89,26 @@ class NewportPort:
 
     def _clean(self) -> None:
         """After a lost answer: drain the line, then verify the controller's version."""
-        if not self.line.reply_pending:
+        self.line.recover()
+        if not self.line.reply_pending and self._openings == self.line.openings:
             return
         self.line.drain(_QUIET_S)
         if not self.version:  # while opening there is nothing yet to compare with
             self.line.reply_pending = False
             return
-        version = self._exchange("VE")
-        if version != self.version:
+        self._require_same("VE", "", self.version)
+        if self._openings != self.line.openings:
+            self._require_same("ID", "?", self.stage)
+            self._openings = self.line.openings
+
+    def _require_same(self, letters: str, value: str, before: str) -> None:
+        answer = self._exchange(letters, value)
+        if answer != before:
             self.line.reply_pending = True
-            raise Garbled(f"{self.who}: calls itself {version!r} now, and {self.version!r} before")
+            raise Garbled(
+                f"{self.who}: answers {letters} with {answer!r} now, and with {before!r} before: "
+                "look at what is connected there"
+            )
 
 
 class NewportStage(MotorStage):
@@ -106,19 +120,21 @@ class NewportStage(MotorStage):
         self, name: str, line: Line, address: int, model: str, limits: Limits, clock: Clock
     ) -> None:
         super().__init__(name, limits, clock, line)
+        self._model = model
         self._who = f"{name} (Newport {model}, address {address} on {line.port})"
         self._port = NewportPort(line, address, self._who)
-        if model not in self._port.version:
+        if not self._port.version.startswith(NAMES[model]):
             raise DeviceError(
-                f"{self._who}: calls itself {self._port.version!r}; expected: a {model}: look at "
-                "the port and the address in the rig file"
+                f"{self._who}: calls itself {self._port.version!r}; expected of a {model}: "
+                f"{' or '.join(NAMES[model])}: look at port, address and model in the rig file"
             )
-        self._stage = self._port.query("ID", str, "?")
+        self._port.stage = self._port.query("ID", str, "?")
         self._range = (self._setting("SL"), self._setting("SR"))
 
     def identity(self) -> str:
-        """Return the controller's version, the stage's name and the address."""
-        return f"Newport {self._port.version}, stage {self._stage}, address {self._port.address}"
+        """Return the model, the controller's version, the stage's name and the address."""
+        port = self._port
+        return f"Newport {self._model}: {port.version}, stage {port.stage}, address {port.address}"
 
     def status(self, retry: bool = True) -> Status:
         """Read state and errors, then the position."""

@@ -24,12 +24,14 @@ class ZaberPort:
     """One axis of a device on a line that others may share.
 
     Each query has a number that its reply repeats, so a late reply is never taken for another's.
-    Numbers repeat after 99 queries; therefore the line is drained while a reply is pending.
+    Numbers repeat after 99 queries; therefore the line is drained while a reply is pending. After
+    the port was gone, the device must report the serial number that it had before.
     """
 
     def __init__(self, line: Line, device: int, axis: int, who: str) -> None:
         self.line, self.device, self.axis, self.who = line, device, axis, who
-        self._next_id = 0
+        self._next_id, self._openings = 0, line.openings
+        self.serial = self.query("get system.serial", axis=0).data
 
     def query(self, text: str, axis: int | None = None, tries: int = _TRIES) -> Reply:
         """Return the reply to a command that changes nothing and may be repeated."""
@@ -38,21 +40,35 @@ class ZaberPort:
     def send(self, text: str, axis: int | None = None) -> Reply:
         """Send a command, once; raise `DeviceError` with the reason if it is refused."""
         with self.line.lock.hold():
-            if self.line.reply_pending:
-                self.line.drain(_QUIET_S)
-            self._next_id = (self._next_id + 1) % _STOP_ID
-            number, to = self._next_id, self.axis if axis is None else axis
-            request = framing.command(self.device, to, number, text)
-            reply = self.line.exchange(
-                self.who, request, lambda line: self._own_reply(line, to, number)
-            )
+            self.line.recover()
+            if self._openings != self.line.openings:
+                self._require_same_device()
+            reply = self._exchange(text, self.axis if axis is None else axis)
         if not reply.accepted:
             raise DeviceError(f"{self.who}: refused {text!r}: {reply.data}")
         return reply
 
+    def _exchange(self, text: str, axis: int) -> Reply:
+        if self.line.reply_pending:
+            self.line.drain(_QUIET_S)
+        self._next_id = number = (self._next_id + 1) % _STOP_ID
+        request = framing.command(self.device, axis, number, text)
+        return self.line.exchange(
+            self.who, request, lambda line: self._own_reply(line, axis, number)
+        )
+
+    def _require_same_device(self) -> None:
+        serial = self._exchange("get system.serial", 0).data
+        if serial != self.serial:
+            raise DeviceError(
+                f"{self.who}: serial number {serial} answers now, and {self.serial} before: look "
+                "at what is connected there"
+            )
+        self._openings = self.line.openings
+
     def stop(self) -> None:
         """Stop this axis, without the lock: the line is full duplex, and the reply is ignored."""
-        self.line.write(framing.command(self.device, self.axis, _STOP_ID, "stop"))
+        self.line.write_at_once(framing.command(self.device, self.axis, _STOP_ID, "stop"))
 
     def _own_reply(self, line: bytes, axis: int, number: int) -> Reply | None:
         reply = framing.reply_of(line)
@@ -81,12 +97,11 @@ class ZaberStage(MotorStage):
         self._steps_per_deg = microsteps_per_deg
         self._at_rest = False
         self._device_id = self._whole("deviceid", axis=0)
-        self._serial = self._port.query("get system.serial", axis=0).data
         self._range = self._angle("limit.min"), self._angle("limit.max")
 
     def identity(self) -> str:
         """Return device id, serial number and axis."""
-        return f"Zaber device {self._device_id}, serial {self._serial}, axis {self._port.axis}"
+        return f"Zaber device {self._device_id}, serial {self._port.serial}, axis {self._port.axis}"
 
     def status(self, retry: bool = True) -> Status:
         """Read position, motion and warnings, which come in one reply.

@@ -1,4 +1,9 @@
-"""Emulated Newport SMC100: states, error codes and answers as in the maker's manual."""
+"""Emulated Newport SMC100 or CONEX-CC: states, error codes and answers as in the maker's manuals.
+
+Transcripts: the versions and the form of the stage's name are quoted from public laboratory notes
+and drivers' tests of real controllers (SMC100CC, CONEX-CC). Not verified on a device: the answers'
+number of decimals, the time of an answer (here none; a query takes some 10 ms), and the SMC_PP.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +14,11 @@ from sim.emulated.motor import Motor
 _NOT_REFERENCED, _HOMING, _MOVING, _READY_HOMED, _READY_MOVED = "0A", "1E", "28", "32", "33"
 _DISABLED = "3C"
 _ALL_AXES = ""
+STAGE = "URS100CC"
+VERSIONS = {
+    "SMC100": " SMC_CC - Controller-driver version  3. 1. 2",
+    "CONEX-CC": " CONEX-CC 2.0.1",
+}
 
 
 class NewportController:
@@ -17,10 +27,12 @@ class NewportController:
     `moves`: number of moves started.
     """
 
-    def __init__(self, motor: Motor, address: int = 1, model: str = "SMC100") -> None:
+    def __init__(
+        self, motor: Motor, address: int = 1, model: str = "SMC100", stage: str = STAGE
+    ) -> None:
         self.motor, self.address = motor, address
-        self._version = f" {model}_CC_Controller-driver version  2.0.0"
-        self._stage = "URS100CC_SIM0001"
+        self._version = VERSIONS[model]
+        self._stage = stage
         self._buffer = b""
         self._error = "@"
         self._moved = False

@@ -132,6 +132,10 @@ class PtyWire(Wire):
         self._descriptors = threading.Lock()
         super().__init__(controllers)
 
+    def send_noise(self, data: bytes) -> None:
+        """Send bytes that no controller has sent."""
+        self._send(data)
+
     def _serve(self) -> None:
         while not self._closing.is_set():
             try:

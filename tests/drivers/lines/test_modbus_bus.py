@@ -12,7 +12,7 @@ import pytest
 
 from drivers.lines.modbus_bus import ModbusBus, ModbusUnit
 from drivers.lines.modbus_client import BusSettings
-from drivers.lines.serial_line import NoReply, PortGone
+from drivers.lines.serial_line import REOPEN_S, NoReply, PortGone
 from drivers.stages.motor_stage import Stopped
 from drivers.stages.oriental import OrientalStage
 from drivers.stages.oriental_framing import value_of
@@ -133,7 +133,8 @@ def test_fault_while_homing(kind: str, fault: str) -> None:
 
 @pytest.mark.parametrize(
     ("kind", "fault"),
-    [("pty", name) for name in FAULTS] + [("tcp", name) for name in ("late", "nul", "unplug")],
+    [("pty", name) for name in FAULTS if name != "unplug"]  # see test_returning_port
+    + [("tcp", name) for name in ("late", "nul", "unplug")],
 )
 def test_fault_while_stopping(kind: str, fault: str) -> None:
     with emulated_drive(kind, reply_s=2 * REPLY_S) as az:
@@ -144,7 +145,7 @@ def test_fault_while_stopping(kind: str, fault: str) -> None:
             with pytest.raises(NoReply, match="not acknowledged: it may still move"):
                 stage.stop()
         else:
-            _outcome(fault, stage.stop)
+            _outcome(fault, stage.stop, REOPEN_S + 1.0)
         assert not az.motor.moving
         if fault != "unplug":
             here = az.motor.position_deg
@@ -244,8 +245,8 @@ def test_a_gateway_that_has_hung_up_is_reconnected() -> None:
         assert stage.position_deg() == 0.0
 
 
-def _outcome(fault: str, action: Callable[[], T]) -> T | None:
-    """Result of an action within 2 s; None for a named error, allowed only after an unplug."""
+def _outcome(fault: str, action: Callable[[], T], within_s: float = 2.0) -> T | None:
+    """Result of an action in time; None for a named error, allowed only after an unplug."""
     begun_s = time.monotonic()
     if fault == "unplug":
         value = None
@@ -253,5 +254,5 @@ def _outcome(fault: str, action: Callable[[], T]) -> T | None:
             action()
     else:
         value = action()
-    assert time.monotonic() - begun_s < 2.0
+    assert time.monotonic() - begun_s < within_s
     return value

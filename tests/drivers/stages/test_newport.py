@@ -8,8 +8,10 @@ from drivers.lines.serial_line import Line
 from drivers.stages.newport import NewportStage
 from instrument.clock import SystemClock
 from instrument.errors import DeviceError
+from sim.emulated.motor import Motor
+from sim.emulated.newport_controller import NewportController
 from sim.emulated.wire import PtyWire
-from tests.support.stages.emulated_stages import LIMITS
+from tests.support.stages.emulated_stages import LIMITS, MECHANICS
 
 pytestmark = pytest.mark.waits
 
@@ -28,8 +30,12 @@ class Parrot:
     ("words", "says"),
     [
         (
+            b"1VE CONEX-CC 2.0.1\r\n",
+            "calls itself 'CONEX-CC 2.0.1'; expected of a SMC100: SMC_CC or SMC_PP",
+        ),
+        (
             b"1VE ESP301 Version 3.0.1\r\n",
-            "calls itself 'ESP301 Version 3.0.1'; expected: a SMC100",
+            "calls itself 'ESP301 Version 3.0.1'; expected of a SMC100: SMC_CC or SMC_PP",
         ),
         (b"@01 0 OK IDLE -- 0\r\n", "only b'@01 0 OK IDLE -- 0'"),
         (b"", "no answer within 0.15 s: look at its power and at the cable"),
@@ -41,3 +47,28 @@ def test_another_device_is_refused_and_its_answer_quoted(words: bytes, says: str
             NewportStage("theta_r", line, 1, "SMC100", LIMITS, SystemClock())
         assert says in str(refused.value)
         assert str(wire.port) in str(refused.value)
+
+
+class Renamed(NewportController):
+    """Controller with another version."""
+
+    def __init__(self, motor: Motor, version: str) -> None:
+        super().__init__(motor)
+        self._version = version
+
+
+@pytest.mark.parametrize(
+    ("model", "version"),  # as laboratories quote them from real controllers
+    [
+        ("SMC100", " SMC_CC - Controller-driver version  3. 1. 2"),
+        ("SMC100", " SMC_PP - Controller-driver version  3. 1. 2"),
+        ("CONEX-CC", " CONEX-CC 2.0.1"),
+        ("CONEX-CC", "CONEX-CC 2.0.1"),
+    ],
+)
+def test_a_real_controllers_version_is_accepted(model: str, version: str) -> None:
+    clock = SystemClock()
+    controller = Renamed(Motor(MECHANICS, clock), version)
+    with PtyWire([controller]) as wire, Line("theta_r", wire.port, 57600, clock) as line:
+        stage = NewportStage("theta_r", line, 1, model, LIMITS, clock)
+        assert version.strip() in stage.identity()
