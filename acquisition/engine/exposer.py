@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from acquisition.engine.exposure_check import ExposureCheck
 from acquisition.engine.retrying_camera import RetryingCamera
+from acquisition.measure.linearity import require_possible_times
 from acquisition.measure.radiometry import SATURATION_FRACTION, Dark, average_dark, bright_level
 from acquisition.measure.window import Window
 from acquisition.plan.exposure_ladder import longest_exposure_s
@@ -17,6 +19,7 @@ from instrument.clock import Clock
 from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
 from instrument.devices import Frame, Lamp, Surface
+from instrument.errors import DeviceError
 from instrument.record.event_kinds import OPERATOR
 from instrument.record.reading import Reading
 from instrument.record.record import Record
@@ -41,7 +44,11 @@ class Exposed:
 
 @dataclass(slots=True)
 class Exposer:
-    """Chooses exposures, and takes and keeps one dark for each; every dark is recorded."""
+    """Chooses exposures, and takes and keeps one dark for each; every dark is recorded.
+
+    An exposure that is used for the first time is checked by light. Where the camera rounds an
+    exposure, the one that it confirmed counts.
+    """
 
     camera: RetryingCamera
     lamp: Lamp
@@ -49,16 +56,22 @@ class Exposer:
     protocol: Protocol
     rig: Rig
     record: Record
+    _check: ExposureCheck = field(init=False)
     _start_s: float = field(default=0.0, init=False)
+    _taken_s: dict[float, float] = field(default_factory=dict, init=False)  # by what was asked for
     _darks: dict[float, Dark] = field(default_factory=dict, init=False)
     _used_before: frozenset[float] = field(default=frozenset(), init=False)
     _last: dict[Surface, Reading] = field(default_factory=dict, init=False)
+
+    def __post_init__(self) -> None:
+        self._check = ExposureCheck(self.rig.camera, self.clock, self.record)
 
     def restore(self, readings: Sequence[Reading]) -> None:
         """Take over from a stopped scan: brightness of the surfaces, and exposures with a dark."""
         for reading in readings:
             self.note_brightness(reading)
         self._used_before = frozenset(reading.exposure_s for reading in readings)
+        self._check.confirmed |= self._used_before
 
     def note_brightness(self, reading: Reading) -> None:
         """Base the first exposure of the surface's next step on this reading."""
@@ -70,28 +83,47 @@ class Exposer:
 
     def expose(self, step: Step, window: Window) -> Exposed:
         """Take all frames of a step, unsaturated if the camera's exposure range allows it."""
-        first = self._first_frame(step, window)
+        *tried, first = self._search(step, window)
         frames = [first]
         if step.frames > 1:
             frames += self.camera.grab(step.frames - 1)
+        require_possible_times(frames)
         time_s, utc = round(self._scan_s(), 3), self.clock.utc().isoformat()
         dark = self._dark(first.exposure_s)
+        self._check.require_proportional(tried, frames, self._darks, window)
         return Exposed(step, frames, dark, time_s=time_s, free_s=self._scan_s(), time_utc=utc)
 
     def _scan_s(self) -> float:
-        return self.clock.now_s() - self._start_s
+        """Return the scan time, without the frames of the exposure check."""
+        return self.clock.now_s() - self._start_s - self._check.spent_s
 
-    def _first_frame(self, step: Step, window: Window) -> Frame:
-        """Try exposures until the brightest part of the window is within the target."""
+    def _search(self, step: Step, window: Window) -> list[Frame]:
+        """Try exposures until the brightest part of the window is within the target.
+
+        Returns one frame of each exposure, the chosen one last, a frame for the check first.
+        """
         exposure_s = self._first_guess_s(step)
-        tried: list[float] = []
+        frames, tried = self._comparison(exposure_s), list[float]()
         while True:
             tried.append(exposure_s)
-            self.camera.set_exposure_s(exposure_s)
-            frame = self.camera.grab(1)[0]
-            exposure_s = self._suitable_s(frame, window)
+            self._set(exposure_s)
+            frames.append(self.camera.grab(1)[0])
+            exposure_s = self._suitable_s(frames[-1], window)
             if exposure_s in tried or len(tried) == MAX_EXPOSURES_TRIED:
-                return frame
+                return frames
+
+    def _comparison(self, exposure_s: float) -> list[Frame]:
+        """Take a frame of a shorter exposure, if the given one is to be checked."""
+        shorter_s = self._check.comparison_s(self._taken_s.get(exposure_s, exposure_s))
+        if shorter_s is None:
+            return []
+        with self._check.timed():
+            self._set(shorter_s)
+            return self.camera.grab(1)
+
+    def _set(self, exposure_s: float) -> None:
+        """Set an exposure and note the one that the camera confirms."""
+        self._taken_s[exposure_s] = self.camera.set_exposure_s(exposure_s)
 
     def _first_guess_s(self, step: Step) -> float:
         """Return the exposure that suits the surface's last reading, or else the planned one."""
@@ -107,7 +139,7 @@ class Exposer:
             return frame.exposure_s
         camera, peak = self.rig.camera, bright_level(counted)
         if peak >= SATURATION_FRACTION * camera.max_dn:  # the true brightness is unknown
-            return longest_exposure_s(frame.exposure_s / 4, camera)
+            return longest_exposure_s(frame.exposure_s / 4, camera, self._taken_s)
         return self._exposure_s(peak, frame.exposure_s)
 
     def _exposure_s(self, peak_dn: float, exposure_s: float) -> float:
@@ -115,15 +147,22 @@ class Exposer:
         camera = self.rig.camera
         rate_dn_per_s = max(peak_dn - camera.black_level_dn, 0.5) / exposure_s
         target = self.protocol.exposure_target * (camera.max_dn - camera.black_level_dn)
-        return longest_exposure_s(target / rate_dn_per_s, camera)
+        return longest_exposure_s(target / rate_dn_per_s, camera, self._taken_s)
 
     def _dark(self, exposure_s: float) -> Dark:
         """Return the dark of an exposure; the scan time excludes darks repeated by a resume."""
         if exposure_s not in self._darks:
             begun_s = self.clock.now_s()
-            self.take_darks((exposure_s,))
+            asked_s = next((a for a, t in self._taken_s.items() if t == exposure_s), exposure_s)
+            self.take_darks((asked_s,))
             if exposure_s in self._used_before:
                 self._start_s += self.clock.now_s() - begun_s
+        if exposure_s not in self._darks:
+            raise DeviceError(
+                f"camera: {exposure_s:g} s cannot be set a second time: it now takes "
+                f"{self._taken_s[asked_s]:g} s where {asked_s:g} s is asked for; name exposures in "
+                "the rig file (min_exposure_s) that it keeps"
+            )
         return self._darks[exposure_s]
 
     def take_darks(self, exposures_s: Sequence[float]) -> None:
@@ -133,12 +172,14 @@ class Exposer:
         self.lamp.darken()
         self._note_cover("lamp covered for the darks")
         for exposure_s in exposures_s:
-            self.camera.set_exposure_s(exposure_s)
-            dark = average_dark(self.camera.grab(self.protocol.dark_frames), self.rig.camera)
-            self._darks[exposure_s] = dark
+            self._set(exposure_s)
+            frames = self.camera.grab(self.protocol.dark_frames)
+            require_possible_times(frames)
+            dark = average_dark(frames, self.rig.camera)
+            self._darks[dark.exposure_s] = dark
             mean, noise = float(dark.mean.mean()), float(np.sqrt(dark.variance.mean()))
             time_utc = self.clock.utc().isoformat()
-            self.record.add_dark(time_utc, exposure_s, dark.frames, mean, noise)
+            self.record.add_dark(time_utc, dark.exposure_s, dark.frames, mean, noise)
         self.lamp.light()
         self._note_cover("lamp uncovered")
 

@@ -6,6 +6,7 @@ Few different exposures need few dark frames.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from instrument.config.camera import CameraConfig
 from instrument.config.protocol import Protocol
@@ -28,10 +29,16 @@ def exposure_ladder_s(camera: CameraConfig) -> tuple[float, ...]:
     return tuple(dict.fromkeys(float(f"{e:.6g}") for e in exact))
 
 
-def longest_exposure_s(limit_s: float, camera: CameraConfig) -> float:
-    """Return the longest exposure of the ladder up to `limit_s`, or else its shortest."""
-    ladder = exposure_ladder_s(camera)
-    return max((e for e in ladder if e <= limit_s * (1 + 1e-9)), default=ladder[0])
+def longest_exposure_s(
+    limit_s: float, camera: CameraConfig, taken_s: Mapping[float, float] | None = None
+) -> float:
+    """Return the rung of the ladder with the longest exposure up to `limit_s`, or else its lowest.
+
+    `taken_s`: exposures that the camera took, by the rung that was asked for, where they differ.
+    """
+    ladder, taken = exposure_ladder_s(camera), taken_s or {}
+    allowed = [rung for rung in ladder if taken.get(rung, rung) <= limit_s * (1 + 1e-9)]
+    return max(allowed, key=lambda rung: taken.get(rung, rung), default=ladder[0])
 
 
 def expected_exposure_s(

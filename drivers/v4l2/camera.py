@@ -16,7 +16,7 @@ from drivers.v4l2 import ioctl
 from drivers.v4l2.capture import Traits
 from drivers.v4l2.open_device import CHECK_USB, camera_lost
 from drivers.v4l2.session import EXTRA_FRAMES, Session
-from drivers.v4l2.settings import BUFFERS, V4l2Settings
+from drivers.v4l2.settings import BUFFERS, STEPS_PER_S, V4l2Settings
 from drivers.v4l2.worker_thread import Heartbeat, Hung, WorkerThread
 from instrument.clock import Clock
 from instrument.closeable import Closeable
@@ -47,6 +47,7 @@ class V4l2Camera(Closeable):
         self._traits: Traits | None = None
         self._capability: ioctl.Capability | None = None
         self._closed = False
+        self._rounded: set[int] = set()
         self._worker = WorkerThread(f"camera {settings.device}", clock)
         self._released: Future[None] = self._worker.post(lambda: None)
         try:
@@ -92,11 +93,18 @@ class V4l2Camera(Closeable):
         return limitations
 
     def set_exposure_s(self, exposure_s: float) -> float:
-        """Set the exposure, a multiple of 100 µs, and return the one read back, in seconds."""
+        """Set the exposure, a multiple of 100 µs, and return the one read back, in seconds.
+
+        A camera may round it, by a factor of up to 1.5; this is logged once for each exposure.
+        """
         steps = self._settings.exposure_steps(exposure_s)
         session = self._opened()
         read_back_s = self._call(lambda _: session.set_exposure(steps), _CONTROL_S)
         self._steps = steps
+        if steps not in self._rounded and abs(read_back_s * STEPS_PER_S - steps) > 0.5:
+            self._rounded.add(steps)
+            text = "%s: exposure %g s asked for, the camera took %g s, which is used"
+            log.warning(text, self._who(), exposure_s, read_back_s)
         return read_back_s
 
     def grab(self, count: int) -> list[Frame]:

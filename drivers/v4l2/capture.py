@@ -58,7 +58,10 @@ class Arrival:
 
 
 class Capture:
-    """Opens the camera and applies all settings; `start` then starts the stream."""
+    """Opens the camera and applies all settings; `start` then starts the stream.
+
+    `exposure_s`: the exposure read back when it was set last, in seconds.
+    """
 
     def __init__(self, settings: V4l2Settings, exposure_steps: int, clock: Clock) -> None:
         self._settings, self._clock = settings, clock
@@ -100,8 +103,12 @@ class Capture:
         os.close(self._control)
 
     def set_exposure(self, steps: int) -> None:
-        """Set the exposure in steps of 100 µs and read it back."""
-        self._exposure_s = self._controls.set(EXPOSURE, steps) / STEPS_PER_S
+        """Set the exposure in steps of 100 µs; `exposure_s` is the one read back."""
+        self.exposure_s = self._controls.set_rounded(EXPOSURE, steps) / STEPS_PER_S
+
+    def require_unchanged(self) -> None:
+        """Raise if another program has changed a control since it was set."""
+        self._controls.require_unchanged()
 
     def start(self, heartbeat: Heartbeat) -> None:
         """Start the stream and wait for the first frame, which may take longer than others."""
@@ -114,13 +121,13 @@ class Capture:
                 "USB hub with others, and plug it in again"
             )
         if not started:
-            self.next(heartbeat, self._exposure_s + _STARTING_S)
+            self.next(heartbeat, self.exposure_s + _STARTING_S)
 
     def measure_traits(self, heartbeat: Heartbeat) -> Traits:
         """Start the stream and measure the properties of its frames."""
         began_s = self._clock.now_s()
         self.start(heartbeat)
-        patience_s = self._exposure_s + PATIENCE_S
+        patience_s = self.exposure_s + PATIENCE_S
         arrivals = [self.next(heartbeat, patience_s) for _ in range(_PROBE_FRAMES)]
         stamps = [arrival.stamp_s for arrival in arrivals]
         periods = np.diff(stamps)
@@ -146,7 +153,7 @@ class Capture:
             self._clock.sleep(_RETRY_S)
         self.check_presence()
         raise CameraLost(
-            f"{self._who}: no frame for {patience_s:.1f} s at an exposure of {self._exposure_s:g} "
+            f"{self._who}: no frame for {patience_s:.1f} s at an exposure of {self.exposure_s:g} "
             f"s: the stream stands still; {CHECK_USB}; the next attempt reopens the camera"
         )
 

@@ -27,6 +27,7 @@ EXPOSURE = LabelledControl(ioctl.EXPOSURE_ABSOLUTE, "exposure", 1e-4, " s")
 GAIN = LabelledControl(ioctl.GAIN, "gain")
 _GAMMA = LabelledControl(ioctl.GAMMA, "gamma", 0.01)  # a USB camera's gamma counts hundredths
 _LINEAR = 100
+_MOST_ROUNDING = 1.5  # tables of exposures in factors of two round by up to sqrt 2
 _AUTOMATIC = (
     (
         LabelledControl(ioctl.EXPOSURE_AUTO, "manual exposure, which is mode"),
@@ -42,8 +43,12 @@ class Controls:
 
     def __init__(self, descriptor: int, who: str) -> None:
         self._descriptor, self._who = descriptor, who
-        self.read_back: dict[str, str] = {}
+        self._standing: dict[LabelledControl, int] = {}
+
+    @property
+    def read_back(self) -> dict[str, str]:
         """Each control that was set, as the camera reported it afterwards."""
+        return {control.label: control.text(value) for control, value in self._standing.items()}
 
     def disable_automatic(self) -> list[str]:
         """Switch off every automatic control that would change the counts.
@@ -84,25 +89,63 @@ class Controls:
 
     def set(self, control: LabelledControl, value: int) -> int:
         """Set a control and read it back; anything but exactly this value is an error."""
+        read_back = self._write(control, value)
+        if read_back != value:
+            raise self._other_value(control, value, read_back)
+        self._standing[control] = read_back
+        return read_back
+
+    def set_rounded(self, control: LabelledControl, value: int) -> int:
+        """Set a control that the camera may round, and return the value read back.
+
+        A value that differs by more than a factor of 1.5 is an error: the camera has limited it or
+        ignored it.
+        """
+        read_back = self._write(control, value)
+        if not value / _MOST_ROUNDING <= read_back <= value * _MOST_ROUNDING:
+            raise self._other_value(control, value, read_back)
+        self._standing[control] = read_back
+        return read_back
+
+    def require_unchanged(self) -> None:
+        """Raise if a control no longer has the value that was read back when it was set."""
+        for control, value in self._standing.items():
+            found = self._read(control)
+            if found != value:
+                raise DeviceError(
+                    f"{self._who}: {control.label} is {control.text(found)}, but "
+                    f"{control.text(value)} was set: another program changes the camera; close it "
+                    "(v4l2-ctl, guvcview, a browser); the frames taken meanwhile are not used"
+                )
+
+    def _write(self, control: LabelledControl, value: int) -> int:
+        """Set a control within the camera's range and return the value read back."""
         found = self.check_range(control, value)
-        asked = self._asked(control, value)
         try:
             ioctl.set_control(self._descriptor, found.number, value)
         except OSError as error:
             self._check_presence()
             raise DeviceError(
-                f"{asked}; the camera refused it ({os.strerror(error.errno or 0)}) although it "
-                f"allows {_range(found, control)}; look whether another program uses the camera, "
-                "or plug it in again"
+                f"{self._asked(control, value)}; the camera refused it "
+                f"({os.strerror(error.errno or 0)}) although it allows {_range(found, control)}; "
+                "look whether another program uses the camera, or plug it in again"
             ) from error
-        read_back = ioctl.control_value(self._descriptor, found.number)
-        if read_back != value:
-            raise DeviceError(
-                f"{asked}, the camera took {control.text(read_back)}; it says that it allows "
-                f"{_range(found, control)}; ask for what the camera can do"
-            )
-        self.read_back[control.label] = control.text(read_back)
-        return read_back
+        return ioctl.control_value(self._descriptor, found.number)
+
+    def _read(self, control: LabelledControl) -> int:
+        """Return a control's value; a single failed request is repeated if the camera is there."""
+        try:
+            return ioctl.control_value(self._descriptor, control.number)
+        except OSError:
+            self._check_presence()
+            return ioctl.control_value(self._descriptor, control.number)
+
+    def _other_value(self, control: LabelledControl, value: int, read_back: int) -> DeviceError:
+        found = self.check_range(control, value)
+        return DeviceError(
+            f"{self._asked(control, value)}, the camera took {control.text(read_back)}; it says "
+            f"that it allows {_range(found, control)}; ask for what the camera can do"
+        )
 
     def _asked(self, control: LabelledControl, value: int) -> str:
         return f"{self._who}: {control.label} {control.text(value)} asked for"

@@ -45,8 +45,9 @@ ENUM_FRAMESIZES = _request(_READ | _WRITE, 74, 44)
 
 CAPABILITY_STRUCT = Struct("<16s32s32sIII12x")  # driver, card, bus, version, capabilities, device's
 FMTDESC_STRUCT = Struct("<III32sI16x")  # index, type, flags, description, fourcc
-# type, width, height, fourcc, field, bytes per line, size of the image, colour space
-FORMAT_STRUCT = Struct("<I4xIIIIIII172x")
+# type, width, height, fourcc, field, bytes per line, size of the image, colour space, magic number
+# of the fields that follow, flags, encoding of colours, quantization
+FORMAT_STRUCT = Struct("<I4x11I156x")
 REQBUFS_STRUCT = Struct("<IIII4x")  # count, type, memory, capabilities
 # index, type, bytes used, flags, field, s, us, sequence, memory, offset, length
 BUFFER_STRUCT = Struct("<5I4xqq16xIIQI12x")
@@ -57,6 +58,9 @@ QUERYCTRL_STRUCT = Struct("<II32siiiiI8x")
 # index, fourcc, kind, then width, height; or minimum, maximum, step of width and of height
 FRAMESIZE_STRUCT = Struct("<IIIIIIIII8x")
 
+JPEG_COLOURS = 7  # V4L2_COLORSPACE_JPEG
+# V4L2_QUANTIZATION_DEFAULT, _FULL_RANGE, _LIM_RANGE
+DEFAULT_RANGE, FULL_RANGE, LIMITED_RANGE = 0, 1, 2
 BUFFER_QUEUED, BUFFER_DONE, BUFFER_ERROR = 0x2, 0x4, 0x40
 DISCRETE = 1  # V4L2_FRMSIZE_TYPE_DISCRETE
 
@@ -108,13 +112,14 @@ class Capability:
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """Image format of a device."""
+    """Image format of a device; `limited_range`: black is at 16 and white at 235."""
 
     name: str
     width_px: int
     height_px: int
     bytes_per_line: int
     bytes_total: int
+    limited_range: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,10 +173,23 @@ def capability(descriptor: int) -> Capability:
 
 def current_format(descriptor: int) -> Format:
     """Return the device's image format."""
-    asked = FORMAT_STRUCT.pack(CAPTURE, *[0] * 7)
+    asked = FORMAT_STRUCT.pack(CAPTURE, *[0] * 11)
     answer = FORMAT_STRUCT.unpack(_call(descriptor, G_FMT, asked))
-    _, width, height, number, _, per_line, total, _ = answer
-    return Format(fourcc_name(number), width, height, per_line, total)
+    _, width, height, number, _, per_line, total, colours, _, _, _, quantization = answer
+    name = fourcc_name(number)
+    limited = _has_limited_range(name, colours, quantization)
+    return Format(name, width, height, per_line, total, limited)
+
+
+def _has_limited_range(name: str, colours: int, quantization: int) -> bool:
+    """Return True for luma from 16 to 235.
+
+    A driver that states no range means limited range for all colours except those of JPEG
+    (V4L2_MAP_QUANTIZATION_DEFAULT in linux/videodev2.h).
+    """
+    if quantization == DEFAULT_RANGE:
+        quantization = FULL_RANGE if colours == JPEG_COLOURS else LIMITED_RANGE
+    return name == "YUYV" and quantization == LIMITED_RANGE
 
 
 def frame_period_s(descriptor: int) -> float | None:

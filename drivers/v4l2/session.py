@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from drivers.v4l2.capture import PATIENCE_S, Capture, Traits
 from drivers.v4l2.frame_filter import FrameFilter
-from drivers.v4l2.settings import BUFFERS, STEPS_PER_S, V4l2Settings
+from drivers.v4l2.settings import BUFFERS, V4l2Settings
 from drivers.v4l2.worker_thread import Heartbeat
 from instrument.clock import Clock
 from instrument.devices import Frame
@@ -32,7 +32,7 @@ class Session:
         clock: Clock,
         heartbeat: Heartbeat,
     ) -> None:
-        self._settings, self._clock, self._steps = settings, clock, exposure_steps
+        self._settings, self._clock = settings, clock
         self._capture = Capture(settings, exposure_steps, clock)
         self.capability = self._capture.capability
         try:
@@ -62,7 +62,7 @@ class Session:
     @property
     def exposure_s(self) -> float:
         """The exposure read back last, in seconds."""
-        return self._steps / STEPS_PER_S
+        return self._capture.exposure_s
 
     @property
     def longest_frame_s(self) -> float:
@@ -75,14 +75,17 @@ class Session:
 
     def set_exposure(self, steps: int) -> float:
         """Set the exposure in steps of 100 µs and return the one read back, in seconds."""
+        before_s = self.exposure_s
         self._capture.set_exposure(steps)
-        if steps != self._steps:
-            self._steps = steps
+        if self.exposure_s != before_s:
             self._filter.exposure_changed(self._clock.now_s(), self.exposure_s)
         return self.exposure_s
 
     def take(self, heartbeat: Heartbeat, count: int, requested_s: float) -> list[Frame]:
-        """Take `count` good frames whose exposure began after `requested_s`."""
+        """Take `count` good frames whose exposure began after `requested_s`.
+
+        Raises `DeviceError` if another program has changed a control meanwhile.
+        """
         self._filter.request(requested_s)
         frames: list[Frame] = []
         bad = 0
@@ -99,6 +102,7 @@ class Session:
                 continue
             frames.append(frame)
             bad = 0
+        self._capture.require_unchanged()
         return frames
 
     def _frame(self, stamp_s: float, fault: str) -> tuple[Frame | None, str]:

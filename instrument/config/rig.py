@@ -14,6 +14,7 @@ from pydantic import Field
 from instrument.config.axes import AXES, EMULATED, Axes, HandAxis, SimulatedAxis, Wired
 from instrument.config.camera import AnyCamera, SimulatedCameraConfig
 from instrument.config.section import Finite, Name, NotNegative, Positive, Section
+from instrument.config.simulation import Simulation
 
 _RANGES = ("theta_i_deg", "dphi_deg", "theta_r_deg")
 Range = Annotated[list[Finite], Field(min_length=2, max_length=2)]
@@ -63,19 +64,6 @@ class LampConfig(Section):
             yield "darkened_by", f"{self.darkened_by}; allowed for a manual lamp: hand"
 
 
-class Simulation(Section):
-    """Hidden properties of a simulated rig: noise seed, lamp drift, position of the sample.
-
-    `sample_height_mm`: distance of the surface from the rotation axis, towards the camera.
-    `lamp_drift_per_hour`: relative change of the lamp's output.
-    """
-
-    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
-    sample_height_mm: Finite = 0.0
-    lamp_drift_per_hour: Annotated[float, Field(gt=-1, lt=1)] = 0.0
-    background_reflectance: Annotated[float, Field(ge=0, le=1)] = 0.02
-
-
 class Rig(Section):
     """Complete rig file."""
 
@@ -101,6 +89,8 @@ class Rig(Section):
             what = ", ".join(f"{name} is {kind}" for name, kind in kinds.items())
             yield "axes", f"{what}; allowed: all simulated, all emulated or all real"
         yield from self._port_conflicts()
+        for text in self.simulation.outside(self.camera.width_px, self.camera.height_px):
+            yield "simulation", text
 
     def _port_conflicts(self) -> Iterator[tuple[str, str]]:
         """Require one kind of driver per port, and a different address for each axis on it."""

@@ -20,6 +20,7 @@ from typing import assert_never
 from instrument.clock import Clock
 from instrument.config.axes import NewportAxis, OrientalAxis, Wired, ZaberAxis
 from instrument.config.camera import V4l2CameraConfig
+from instrument.config.simulation import CameraDefects
 from instrument.devices import Image
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.newport_controller import NewportController
@@ -97,7 +98,8 @@ class EmulatedBench:
                     sensor.scene = snapshot
                 return sensor.picture(exposure.exposure_s)
 
-        device = EmulatedCamera(render, self._snapshot, _capabilities(camera))
+        capabilities = _capabilities(camera, self._scene.rig.simulation.camera_defects)
+        device = EmulatedCamera(render, self._snapshot, capabilities)
         self._closing.enter_context(V4l2Server(device, Path(os.environ[_SOCKET])))
         return CAMERA_DEVICE
 
@@ -121,10 +123,12 @@ def _controller(axis: Wired, motor: Motor) -> Controller:
             assert_never(axis)
 
 
-def _capabilities(camera: V4l2CameraConfig) -> Capabilities:
+def _capabilities(camera: V4l2CameraConfig, defects: CameraDefects) -> Capabilities:
+    frames_per_s = camera.frames_per_s or _FRAMES_PER_S
     return Capabilities(
+        defects=defects,
         formats=(camera.pixel_format,),
         sizes=((camera.width_px, camera.height_px),),
-        frames_per_s=_FRAMES_PER_S,
-        overhead_s=min(camera.frame_overhead_s, 1 / _FRAMES_PER_S),
+        frames_per_s=frames_per_s,
+        overhead_s=min(camera.frame_overhead_s, 1 / frames_per_s),
     )

@@ -5,17 +5,18 @@ from __future__ import annotations
 from instrument.clock import Clock
 from instrument.devices import Frame
 from instrument.errors import DeviceError
+from sim.defects.camera import limit_range, read_back_s, true_exposure_s
 from sim.scene.scene import Scene
 from sim.scene.sensor import Sensor
 
 
 class SimulatedCamera:
-    """Camera with the properties given in the rig file."""
+    """Camera with the properties, and the defects, given in the rig file."""
 
     def __init__(self, scene: Scene, clock: Clock) -> None:
         self._sensor, self._clock = Sensor(scene), clock
-        self._settings = scene.rig.camera
-        self._exposure_s = self._settings.min_exposure_s
+        self._settings, self._defects = scene.rig.camera, scene.rig.simulation.camera_defects
+        self._set_s = self._settings.min_exposure_s
 
     def identity(self) -> str:
         """Return a description with size and bit depth."""
@@ -34,8 +35,8 @@ class SimulatedCamera:
             raise DeviceError(
                 f"camera: exposure {exposure_s:g} s asked for; allowed: {low:g} to {high:g} s"
             )
-        self._exposure_s = exposure_s
-        return exposure_s
+        self._set_s = exposure_s
+        return read_back_s(exposure_s, self._defects)
 
     def grab(self, count: int) -> list[Frame]:
         """Take `count` frames, one after the other, in simulated time."""
@@ -45,6 +46,7 @@ class SimulatedCamera:
         """Do nothing: there is nothing to release."""
 
     def _frame(self) -> Frame:
-        self._clock.sleep(self._exposure_s + self._settings.frame_overhead_s)
-        image = self._sensor.picture(self._exposure_s)
-        return Frame(image, self._exposure_s, self._clock.now_s())
+        exposure_s = true_exposure_s(self._set_s, self._defects)
+        self._clock.sleep(exposure_s + self._settings.frame_overhead_s)
+        image = limit_range(self._sensor.picture(exposure_s), self._defects)
+        return Frame(image, read_back_s(self._set_s, self._defects), self._clock.now_s())

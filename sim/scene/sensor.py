@@ -7,6 +7,7 @@ import numpy as np
 
 from instrument.config.camera import CameraConfig
 from instrument.devices import Image
+from sim.defects.camera import hot_electrons_per_s
 from sim.scene.render import FloatImage, electrons_per_s
 from sim.scene.scene import Scene, stream_key
 
@@ -31,6 +32,7 @@ class Sensor:
         self._series: tuple[int, ...] = ()
         self._frame_number = 0
         shape = (self._settings.height_px, self._settings.width_px)
+        self._hot = hot_electrons_per_s(shape, scene.rig.simulation.camera_defects)
         self._light_state: _SceneState = ()
         self._light = self._no_light = np.zeros(shape, np.float32)
         self._expected_key: tuple[_SceneState, float, float] = ((), 0.0, 0.0)
@@ -74,6 +76,8 @@ class Sensor:
         s = self._settings
         electrons = light * np.float32(level * exposure_s)
         electrons += np.float32(s.dark_current_electrons_per_s * exposure_s)
+        if self._hot is not None:
+            electrons += (self._hot * exposure_s).astype(np.float32)
         np.minimum(electrons, np.float32(s.full_well_electrons), out=electrons)
         spread = np.sqrt(electrons + np.float32(s.read_noise_electrons**2))
         gain = np.float32(1 / s.electrons_per_dn)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import shutil
 import signal
 import sqlite3
@@ -102,6 +103,21 @@ def test_the_record_holds_the_devices_identities_and_the_frames_times(run: Path)
     stamps = [stamp for _, _, stamp in frames]
     assert stamps == sorted(stamps)
     assert all(0 <= read - stamp < 0.5 for _, read, stamp in frames)
+
+
+def test_an_exposure_that_the_camera_does_not_make_ends_the_scan(
+    tmp_path: Path, protocol: Path
+) -> None:
+    """The control takes and reads back any exposure; the sensor makes 0.5 ms at most."""
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(
+        RIG.read_text().replace("homing_s: 2.0", "homing_s: 0.2")
+        + "  camera_defects: {longest_exposure_s: 0.0005}\n"
+    )
+    done = gonio("run", protocol, "--rig", rig, "--out", tmp_path / "run")
+    assert done.returncode == 3
+    assert re.search("camera: (counts at|its frames come every)", done.stderr), done.stderr
+    assert "and start a new run" in done.stderr
 
 
 def test_a_stopped_scan_is_resumed_where_it_ended(tmp_path: Path, protocol: Path) -> None:

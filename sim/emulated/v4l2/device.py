@@ -17,12 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.v4l2 import ioctl
+from instrument.config.simulation import CameraDefects
+from sim.defects.camera import limit_range, read_back_s, true_exposure_s
 
 PixelFormat = Literal["GREY", "Y10", "Y16", "YUYV"]
 BYTES_PER_PIXEL: Mapping[PixelFormat, int] = {"GREY": 1, "Y10": 2, "Y16": 2, "YUYV": 2}
 BadFrame = Literal["flagged", "short"]
 _NEUTRAL_CHROMA = 128  # U and V of grey
 _MANUAL = 1
+STEP_S = 1e-4  # V4L2_CID_EXPOSURE_ABSOLUTE counts 100 µs
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +52,8 @@ class Capabilities:
     frames_per_s: upper limit of the frame rate. overhead_s: read-out time, from the end of an
     exposure to the frame's time stamp. delay_frames: number of frames after which a new exposure
     time takes effect. reports_filled: False for a driver that shows filled buffers as empty until
-    they are dequeued.
+    they are dequeued. quantization: range of YUYV, as the number in G_FMT; `defects.limited_range`
+    of "declared" overrides it. defects: exposures other than those set, limited range.
     """
 
     card: str = "Emulated camera"
@@ -62,6 +66,8 @@ class Capabilities:
     stamp_offset_s: float = 0.0
     reports_filled: bool = True
     without_controls: frozenset[int] = frozenset()
+    quantization: int = ioctl.FULL_RANGE
+    defects: CameraDefects = field(default_factory=CameraDefects)
 
 
 @dataclass(slots=True)
@@ -191,7 +197,7 @@ class EmulatedCamera:
         if number not in self.faults.stuck_controls:
             steps = min(max(value, control.minimum), control.maximum) - control.minimum
             self._values[number] = control.minimum + steps // control.step * control.step
-            self._clamp_exposure()
+            self._change_exposure(number)
         return self._values[number]
 
     def _is_automatic(self, number: int) -> bool:
@@ -199,16 +205,26 @@ class EmulatedCamera:
         automatic = self._values.get(ioctl.EXPOSURE_AUTO, _MANUAL) != _MANUAL
         return number == ioctl.EXPOSURE_ABSOLUTE and automatic
 
-    def _clamp_exposure(self) -> None:
-        clamp = self.faults.clamped_exposure
-        if clamp is not None:
-            exposure = self._values[ioctl.EXPOSURE_ABSOLUTE]
-            self._values[ioctl.EXPOSURE_ABSOLUTE] = min(exposure, clamp)
+    def _change_exposure(self, number: int) -> None:
+        """Let the faults and defects change an exposure that has been set, and its read-back."""
+        if number != ioctl.EXPOSURE_ABSOLUTE:
+            return
+        steps, clamp = self._values[number], self.faults.clamped_exposure
+        steps = steps if clamp is None else min(steps, clamp)
+        known_s = read_back_s(steps * STEP_S, self.capabilities.defects)
+        self._values[number] = round(known_s / STEP_S)
 
     @property
     def exposure_s(self) -> float:
-        """Present exposure time in seconds."""
-        return self._values[ioctl.EXPOSURE_ABSOLUTE] * 1e-4
+        """Present exposure time of the sensor in seconds."""
+        set_s = self._values[ioctl.EXPOSURE_ABSOLUTE] * STEP_S
+        return true_exposure_s(set_s, self.capabilities.defects)
+
+    @property
+    def quantization(self) -> int:
+        """Range of YUYV's luma that the camera declares."""
+        declared = self.capabilities.defects.limited_range == "declared"
+        return ioctl.LIMITED_RANGE if declared else self.capabilities.quantization
 
     @property
     def gain(self) -> int:
@@ -240,7 +256,7 @@ class EmulatedCamera:
 
     def frame_bytes(self, exposure: Exposure, snapshot: object) -> NDArray[np.uint8]:
         """Render a frame; return its bytes in the exposure's pixel format, shape (bytes,)."""
-        image = self.render(exposure, snapshot)
+        image = limit_range(self.render(exposure, snapshot), self.capabilities.defects)
         if exposure.pixel_format == "YUYV" and image.ndim == 2:
             image = np.dstack(
                 [image.astype(np.uint8), np.full(image.shape, _NEUTRAL_CHROMA, np.uint8)]

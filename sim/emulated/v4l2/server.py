@@ -18,6 +18,8 @@ _REQUEST, _ERROR = Struct("<II"), Struct("<i")
 _MAX_BYTES = 1024
 _CAPTURE_AND_STREAMING = 0x04200001  # V4L2_CAP_VIDEO_CAPTURE, _EXT_PIX_FORMAT, _STREAMING
 _DEVICE_CAPS = 0x80000000
+_PROGRESSIVE, _SRGB = 1, 8  # V4L2_FIELD_NONE, V4L2_COLORSPACE_SRGB
+_EXTENDED = 0xFEEDCAFE  # V4L2_PIX_FMT_PRIV_MAGIC
 _TIME_PER_FRAME = 0x1000  # V4L2_CAP_TIMEPERFRAME
 _NEXT = 0x80000000
 _KIND_NUMBERS = {name: number for number, name in reversed(ioctl.KINDS.items())}
@@ -85,7 +87,7 @@ class _Descriptor:
             ioctl.ENUM_FRAMESIZES: ("ENUM_FRAMESIZES", self._list_size),
             ioctl.G_FMT: ("G_FMT", self._format),
             ioctl.S_FMT: ("S_FMT", self._set_format),
-            ioctl.TRY_FMT: ("TRY_FMT", lambda a: _pack_format(self._nearest_format(a))),
+            ioctl.TRY_FMT: ("TRY_FMT", lambda a: self._pack(self._nearest_format(a))),
             ioctl.REQBUFS: ("REQBUFS", self._request_buffers),
             ioctl.QUERYBUF: ("QUERYBUF", lambda a: self._stream.query(_buffer_index(a))),
             ioctl.QBUF: ("QBUF", lambda a: self._stream.queue(_buffer_index(a))),
@@ -144,18 +146,34 @@ class _Descriptor:
 
     def _format(self, argument: bytes) -> bytes:
         _require(argument[:4] == ioctl.CAPTURE.to_bytes(4, "little"))
-        return _pack_format(self._camera.format())
+        return self._pack(self._camera.format())
 
     def _set_format(self, argument: bytes) -> bytes:
         chosen = self._nearest_format(argument)
         _require(self._camera.streamer is None, errno.EBUSY)
         self._camera.set_format(chosen)
-        return _pack_format(chosen)
+        return self._pack(chosen)
 
     def _nearest_format(self, argument: bytes) -> ioctl.Format:
         kind, width, height, number, *_ = ioctl.FORMAT_STRUCT.unpack(argument)
         _require(kind == ioctl.CAPTURE)
         return self._camera.nearest_format(ioctl.fourcc_name(number), width, height)
+
+    def _pack(self, chosen: ioctl.Format) -> bytes:
+        return ioctl.FORMAT_STRUCT.pack(
+            ioctl.CAPTURE,
+            chosen.width_px,
+            chosen.height_px,
+            ioctl.fourcc(chosen.name),
+            _PROGRESSIVE,
+            chosen.bytes_per_line,
+            chosen.bytes_total,
+            _SRGB,
+            _EXTENDED,
+            0,
+            0,
+            self._camera.quantization,
+        )
 
     def _request_buffers(self, argument: bytes) -> bytes:
         count, kind, memory, _ = ioctl.REQBUFS_STRUCT.unpack(argument)
@@ -213,16 +231,3 @@ def _buffer_index(argument: bytes) -> int:
     index, kind, *_ = ioctl.BUFFER_STRUCT.unpack(argument)
     _require(kind == ioctl.CAPTURE)
     return int(index)
-
-
-def _pack_format(chosen: ioctl.Format) -> bytes:
-    return ioctl.FORMAT_STRUCT.pack(
-        ioctl.CAPTURE,
-        chosen.width_px,
-        chosen.height_px,
-        ioctl.fourcc(chosen.name),
-        1,
-        chosen.bytes_per_line,
-        chosen.bytes_total,
-        8,
-    )

@@ -24,7 +24,7 @@ from tests.support.v4l2.remote_camera import (
 )
 
 
-@pytest.mark.parametrize("request_name", ["DQBUF", "QBUF", "QUERYBUF"])
+@pytest.mark.parametrize("request_name", ["DQBUF", "QBUF", "QUERYBUF", "G_CTRL"])
 @pytest.mark.parametrize("error", [errno.EIO, errno.EINVAL])
 def test_a_single_failed_request_is_harmless(
     remote: RemoteCamera, scene: LevelScene, request_name: str, error: int

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from drivers.v4l2 import ioctl
+from instrument.config.simulation import CameraDefects
 from instrument.errors import DeviceError
 from tests.support.v4l2.remote_camera import (
     SETTINGS,
@@ -60,6 +61,45 @@ def test_a_clamped_exposure_is_an_error_and_the_previous_one_is_restored(
         camera.faults.clamped_exposure = None
         assert remote.set_exposure_s(0.03) == 0.03
         assert steps(remote.grab(1)[0]) == 300
+
+
+def test_an_exposure_that_the_camera_rounds_is_used_as_it_was_read_back(
+    remote: RemoteCamera, scene: LevelScene
+) -> None:
+    """Exposures in factors of two, as of webcams: 60 and 61 ms become 62.5 ms."""
+    table = CameraDefects(exposures_s=[0.0156, 0.0312, 0.0625, 0.125], reads_back="true")
+    with served(remote, scene, defects=table):
+        remote.ask("open", replace(SETTINGS, min_exposure_s=0.02))
+        remote.ask("said")
+        for asked_s in (0.06, 0.061, 0.06):
+            assert remote.set_exposure_s(asked_s) == 0.0625
+            (frame,) = remote.grab(1)
+            assert (steps(frame), frame.exposure_s) == (625, 0.0625)
+        said = remote.ask("said")
+    assert [text.partition(": ")[2] for text in said] == [
+        f"exposure {asked_s} s asked for, the camera took 0.0625 s, which is used"
+        for asked_s in (0.06, 0.061)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("number", "value", "message"),
+    [
+        (ioctl.EXPOSURE_ABSOLUTE, 77, "exposure is 0.0077 s, but 0.001 s was set"),
+        (ioctl.GAIN, 200, "gain is 200, but 100 was set"),
+        (ioctl.EXPOSURE_AUTO, 3, "manual exposure, which is mode is 3, but 1 was set"),
+    ],
+)
+def test_a_change_by_another_program_is_noticed(
+    remote: RemoteCamera, scene: LevelScene, number: int, value: int, message: str
+) -> None:
+    with served(remote, scene) as camera:
+        remote.ask("open", SETTINGS)
+        remote.grab(1)
+        camera.set_value(number, value)
+        with pytest.raises(DeviceError, match=f"{WHO}: {message}: another program changes the"):
+            remote.grab(2)
+        assert steps(remote.grab(1)[0]) == 10  # the camera has been set again
 
 
 def test_a_missing_gain_control_is_an_error(remote: RemoteCamera, scene: LevelScene) -> None:

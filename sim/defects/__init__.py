@@ -1,0 +1,1 @@
+"""Defects of real devices that a simulated scene can show; `camera` has those of the camera."""

@@ -1,0 +1,51 @@
+"""Defects of a camera: exposures other than those that were set, hot pixels, limited range."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from instrument.config.simulation import CameraDefects
+from instrument.devices import Image
+from instrument.geometry import FloatArray
+
+# ITU-R BT.601: 8-bit luma has black at 16 and white at 235.
+BLACK_DN, WHITE_DN, FULL_DN = 16, 235, 255
+
+
+def true_exposure_s(set_s: float, defects: CameraDefects) -> float:
+    """Return the exposure of the sensor in seconds when the control is set to `set_s`."""
+    if defects.fixed_exposure_s is not None:
+        return defects.fixed_exposure_s
+    exposure_s = set_s
+    if defects.exposures_s is not None:
+        exposure_s = min(defects.exposures_s, key=lambda known_s: abs(known_s - set_s))
+    if defects.longest_exposure_s is not None:
+        exposure_s = min(exposure_s, defects.longest_exposure_s)
+    return exposure_s
+
+
+def read_back_s(set_s: float, defects: CameraDefects) -> float:
+    """Return the exposure in seconds that the camera reports after it was set to `set_s`."""
+    return true_exposure_s(set_s, defects) if defects.reads_back == "true" else set_s
+
+
+def hot_electrons_per_s(shape: tuple[int, int], defects: CameraDefects) -> FloatArray | None:
+    """Return the extra dark current (rows, columns) in electrons/s; None without hot pixels."""
+    if not defects.hot_pixels:
+        return None
+    current = np.zeros(shape)
+    for pixel in defects.hot_pixels:
+        current[pixel.row, pixel.column] += pixel.electrons_per_s
+    return current
+
+
+def limit_range(image: Image, defects: CameraDefects) -> Image:
+    """Return an image, (rows, columns) in counts, with the black and white of limited range.
+
+    Images of more than 8 bits stay as they are: limited range is a property of 8-bit video.
+    """
+    if defects.limited_range == "none" or image.dtype != np.uint8:
+        return image
+    scaled = BLACK_DN + image * ((WHITE_DN - BLACK_DN) / FULL_DN)
+    counts: Image = np.rint(scaled).astype(np.uint8)
+    return counts

@@ -1,0 +1,107 @@
+"""Exposures checked by light: no wrong exposure is believed, no sound camera is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquisition.engine.exposure_check import ExposureCheck
+from acquisition.plan.exposure_ladder import exposure_ladder_s
+from acquisition.results.reduction import reduced_run
+from acquisition.rig import open_devices
+from instrument.config.load import Loaded
+from instrument.config.protocol import SimulatedSample
+from instrument.config.simulation import CameraDefects
+from instrument.errors import DeviceError
+from instrument.record.record import Record
+from tests.support.scans import changed, small_scan
+from tests.support.stopped_scan import scan
+
+GREY = 0.18
+
+
+def grey_card(defects: dict[str, Any], rig: str = "bench_12bit", seed: int = 2026) -> Loaded:
+    """A scan of a grey card and a white tile by a camera with these defects."""
+    small = small_scan(rig)
+    simulation = small.rig.simulation.model_copy(
+        update={"camera_defects": CameraDefects.model_validate(defects), "seed": seed}
+    )
+    sample = SimulatedSample(model="lambert", parameters={"albedo": GREY})
+    return changed(small, rig={"simulation": simulation}, simulated_sample=sample)
+
+
+@pytest.fixture
+def new_record(tmp_path: Path) -> Iterator[Record]:
+    with Record.create(tmp_path / "run", {}) as record:
+        yield record
+
+
+@pytest.mark.parametrize(
+    "defects",
+    [
+        {"fixed_exposure_s": 0.0157},
+        {"fixed_exposure_s": 0.0005},
+        {"longest_exposure_s": 0.033},
+        {"longest_exposure_s": 0.06},
+        {"exposures_s": [0.0005 * 2**n for n in range(13)]},
+    ],
+)
+def test_an_exposure_that_the_camera_does_not_make_stops_the_scan(
+    new_record: Record, defects: dict[str, Any]
+) -> None:
+    """The white tile needs 25 ms and the grey card 140 ms; the camera says that it took them."""
+    with pytest.raises(DeviceError, match=r"camera: counts at .* does not expose as long as it"):
+        scan(grey_card(defects), new_record)
+    wrong = {r.exposure_s for r in new_record.readings()}
+    fixed, longest = defects.get("fixed_exposure_s"), defects.get("longest_exposure_s", 10)
+    assert fixed not in wrong
+    assert all(exposure_s <= longest * 1.01 for exposure_s in wrong)
+
+
+@pytest.mark.parametrize(
+    ("rig", "seed"), [("bench_12bit", 1), ("bench_12bit", 2), ("paper_1995", 3)]
+)
+def test_a_sound_camera_is_confirmed_at_every_exposure_that_the_scan_uses(
+    new_record: Record, rig: str, seed: int
+) -> None:
+    loaded = grey_card({}, rig, seed)
+    scan(loaded, new_record)
+    texts = [text for _, kind, text in new_record.events() if kind == "exposure"]
+    used = {r.exposure_s for r in new_record.readings()}
+    assert len(texts) >= len(used) - 1
+    for exposure_s in used:
+        assert any(f"{exposure_s:g} s" in text for text in texts), exposure_s
+
+
+@pytest.mark.parametrize("step_s", [0.0016, 0.005])
+def test_a_rounded_exposure_that_is_confirmed_is_used(new_record: Record, step_s: float) -> None:
+    table = [step_s * n for n in range(1, 1000)]
+    loaded = grey_card({"exposures_s": table, "reads_back": "true"})
+    scan(loaded, new_record)
+    used = {r.exposure_s for r in new_record.readings()}
+    assert used <= set(table)
+    assert not used <= set(exposure_ladder_s(loaded.rig.camera))
+    assert {dark[0] for dark in new_record.darks()} == used
+    reduced = reduced_run(new_record, loaded)
+    assert reduced.brdf * 3.14159265 == pytest.approx(GREY, rel=0.03)
+
+
+@pytest.mark.parametrize("albedo", [0.9, 0.02])
+def test_the_check_takes_two_seconds_and_two_exposures_at_most(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, albedo: float
+) -> None:
+    sample = SimulatedSample(model="lambert", parameters={"albedo": albedo})
+    loaded = changed(grey_card({}), simulated_sample=sample)
+    taken_s = []
+    for checked in (True, False):
+        if not checked:
+            monkeypatch.setattr(ExposureCheck, "comparison_s", lambda *_: None)
+        with Record.create(tmp_path / str(checked), {}) as record:
+            devices = open_devices(loaded)
+            scan(loaded, record, changed_devices=lambda _, devices=devices: devices)
+            taken_s.append(devices.clock.now_s())
+            longest_s = max(r.exposure_s for r in record.readings())
+    assert 0 < taken_s[0] - taken_s[1] < 2 + 2 * longest_s
