@@ -111,3 +111,30 @@ class V4l2CameraConfig(CameraConfig):
 
 
 AnyCamera = Annotated[SimulatedCameraConfig | V4l2CameraConfig, Field(discriminator="driver")]
+
+
+class HotPixel(Section):
+    """Pixel with a dark current of its own, in addition to that of all pixels."""
+
+    row: Annotated[int, Field(ge=0)]
+    column: Annotated[int, Field(ge=0)]
+    electrons_per_s: Positive
+
+
+class CameraDefects(Section):
+    """Defects that real cameras have; all are absent unless given.
+
+    `fixed_exposure_s`: exposure of every frame, whatever is set. `longest_exposure_s`: longest
+    true exposure, as of a camera that cannot expose longer than its frame period. `exposures_s`:
+    table of true exposures; the one nearest to the exposure that is set is used. `reads_back`:
+    exposure that the camera reports, the one set (like uvcvideo, which answers from its cache) or
+    the true one. `limited_range`: 8-bit counts have black at 16 and white at 235, and a YUYV camera
+    declares it to the driver or not.
+    """
+
+    fixed_exposure_s: Positive | None = None
+    longest_exposure_s: Positive | None = None
+    exposures_s: Annotated[list[Positive], Field(min_length=1)] | None = None
+    reads_back: Literal["set", "true"] = "set"
+    hot_pixels: list[HotPixel] = Field(default_factory=list)
+    limited_range: Literal["none", "declared", "undeclared"] = "none"

@@ -12,9 +12,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from instrument.config.axes import AXES, EMULATED, Axes, HandAxis, SimulatedAxis, Wired
-from instrument.config.camera import AnyCamera, SimulatedCameraConfig
+from instrument.config.camera import AnyCamera, CameraDefects, SimulatedCameraConfig
 from instrument.config.section import Finite, Name, NotNegative, Positive, Section
-from instrument.config.simulation import Simulation
 
 _RANGES = ("theta_i_deg", "dphi_deg", "theta_r_deg")
 Range = Annotated[list[Finite], Field(min_length=2, max_length=2)]
@@ -62,6 +61,29 @@ class LampConfig(Section):
         """Refuse a shutter on a manual lamp: no driver would operate it."""
         if self.driver == "manual" and self.darkened_by != "hand":
             yield "darkened_by", f"{self.darkened_by}; allowed for a manual lamp: hand"
+
+
+class Simulation(Section):
+    """Hidden properties of a simulated rig: noise seed, lamp drift, position of the sample.
+
+    `sample_height_mm`: distance of the surface from the rotation axis, towards the camera.
+    `lamp_drift_per_hour`: relative change of the lamp's output.
+    """
+
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
+    sample_height_mm: Finite = 0.0
+    lamp_drift_per_hour: Annotated[float, Field(gt=-1, lt=1)] = 0.0
+    background_reflectance: Annotated[float, Field(ge=0, le=1)] = 0.02
+    camera_defects: CameraDefects = CameraDefects()
+
+    def outside(self, width_px: int, height_px: int) -> Iterator[str]:
+        """Yield the hot pixels that lie outside an image of this size, in words."""
+        for pixel in self.camera_defects.hot_pixels:
+            if pixel.row >= height_px or pixel.column >= width_px:
+                yield (
+                    f"hot pixel in row {pixel.row}, column {pixel.column}; allowed: rows up to "
+                    f"{height_px - 1}, columns up to {width_px - 1}"
+                )
 
 
 class Rig(Section):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from instrument.config.simulation import CameraDefects
+from instrument.config.camera import CameraDefects
 from instrument.devices import Image
 from instrument.geometry import FloatArray
 

@@ -19,8 +19,7 @@ from typing import assert_never
 
 from instrument.clock import Clock
 from instrument.config.axes import NewportAxis, OrientalAxis, Wired, ZaberAxis
-from instrument.config.camera import V4l2CameraConfig
-from instrument.config.simulation import CameraDefects
+from instrument.config.camera import CameraDefects, V4l2CameraConfig
 from instrument.devices import Image
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.newport_controller import NewportController

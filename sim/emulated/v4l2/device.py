@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.v4l2 import ioctl
-from instrument.config.simulation import CameraDefects
+from instrument.config.camera import CameraDefects
 from sim.defects.camera import limit_range, read_back_s, true_exposure_s
 
 PixelFormat = Literal["GREY", "Y10", "Y16", "YUYV"]

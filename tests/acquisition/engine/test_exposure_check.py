@@ -12,9 +12,9 @@ from acquisition.engine.exposure_check import ExposureCheck
 from acquisition.plan.exposure_ladder import exposure_ladder_s
 from acquisition.results.reduction import reduced_run
 from acquisition.rig import open_devices
+from instrument.config.camera import CameraDefects
 from instrument.config.load import Loaded
 from instrument.config.protocol import SimulatedSample
-from instrument.config.simulation import CameraDefects
 from instrument.errors import DeviceError
 from instrument.record.record import Record
 from tests.support.scans import changed, small_scan

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from drivers.v4l2 import ioctl
-from instrument.config.simulation import CameraDefects
+from instrument.config.camera import CameraDefects
 from instrument.errors import DeviceError
 from tests.support.v4l2.remote_camera import (
     SETTINGS,

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from instrument.config.simulation import CameraDefects
+from instrument.config.camera import CameraDefects
 from sim.clock import SimulatedClock
 from sim.defects.camera import hot_electrons_per_s, limit_range, read_back_s, true_exposure_s
 from sim.scene.camera import SimulatedCamera
