@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
-from rich import box
-from rich.table import Table
-
 from acquisition.commands.fit_status import no_fit_reported, print_json, require_result
+from acquisition.commands.views import parameter_lines
 from acquisition.results.model_check import check_model
 from acquisition.results.sources import Source, Wanted, read_source
-from acquisition.results.summary import VERDICTS, paper_ratio_note, parameters_of, value_text
-from acquisition.terminal.console import out
+from acquisition.results.summary import VERDICTS, paper_ratio_note, parameters_of
+from acquisition.terminal.console import out, print_lines, print_notes, print_text
+from acquisition.terminal.layout import table_lines, wrapped
 from analysis.choice.choice import Choice, choose
 from analysis.choice.fit_json import to_json
 from analysis.choice.ladder import METHODS, MethodOfFit
@@ -91,45 +91,39 @@ def parse_u_shared(text: str | None) -> float | None:
 def _print(source: Source, choice: Choice) -> None:
     chosen = choice.best
     if chosen is None:
-        out.print(f"{choice.verdict}: {choice.reason}", highlight=False)
+        print_text(f"{choice.verdict}: {choice.reason}")
         return
-    out.print(f"{chosen.model}: {VERDICTS[choice.verdict]}.", highlight=False)
-    parameters = Table("parameter", "value ± u (k = 1)")
-    for parameter in parameters_of(chosen):
-        parameters.add_row(parameter.name, value_text(parameter))
-    out.print(parameters)
-    out.print(_table(choice, chosen))
+    print_text(f"{chosen.model}: {VERDICTS[choice.verdict]}.")
+    print_lines(["", *parameter_lines(parameters_of(chosen), out.width), ""])
+    print_lines([*_table(choice, chosen, out.width), ""])
     noted = (note.text for note in (*source.notes, *choice.notes))
-    for text in (choice.reason, str(choice.symmetry), paper_ratio_note(chosen), *noted):
-        if text:
-            out.print(f"- {text}", highlight=False)
+    print_notes((choice.reason, str(choice.symmetry), paper_ratio_note(chosen), *noted))
 
 
-def _table(choice: Choice, chosen: FitResult) -> Table:
+def _table(choice: Choice, chosen: FitResult, width: int) -> list[str]:
     """The candidates of lowest BIC, and the chosen one; K is the number of parameters."""
     best_bic = min(c.bic for c in choice.candidates)
     best_aicc = min(c.aicc for c in choice.candidates)
     ordered = sorted(choice.candidates, key=lambda c: c.bic)
     shown = [c for n, c in enumerate(ordered) if n < _MOST_ROWS or c is chosen]
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), caption_justify="left")
-    table.caption = "→ chosen, ✗ does not fit"
-    if len(shown) < len(ordered):
-        table.caption += f"; {len(ordered) - len(shown)} more candidates: see --json"
-    table.add_column("\u00a0\u00a0candidate", overflow="fold")  # wraps in a narrow terminal
-    for name in ("K", "rms/mean", "χ²/dof", "ΔBIC", "ΔAICc"):
-        table.add_column(name, no_wrap=True)
+    rows = []
     for c in shown:
-        chi2 = "" if c.reduced_chi2 is None else _short(c.reduced_chi2)
         mark = "→" if c is chosen else "" if c.model in choice.agreeing else "✗"
-        row = (f"{100 * c.rms_relative:.3g} %", chi2, _short(c.bic - best_bic))
-        table.add_row(
-            f"{mark:\u00a0<1}\u00a0{c.model}", str(c.x.size), *row, _short(c.aicc - best_aicc)
-        )
-    return table
+        chi2 = "" if c.reduced_chi2 is None else _short(c.reduced_chi2)
+        above = _short(c.bic - best_bic), _short(c.aicc - best_aicc)
+        rms = f"{100 * c.rms_relative:.3g} %"
+        rows.append((f"{mark:1} {c.model}", str(c.x.size), rms, chi2, *above))
+    header = ("  candidate", "K", "rms/mean", "χ²/dof", "ΔBIC", "ΔAICc")
+    caption = "→ chosen, ✗ does not fit; K: number of parameters; Δ: above the lowest"
+    if len(shown) < len(ordered):
+        caption += f"; {len(ordered) - len(shown)} more candidates: see --json"
+    return [*table_lines(header, rows, width, indent="  "), *wrapped(caption, width)]
 
 
 def _short(number: float) -> str:
     """Return the number in at most six characters."""
+    if not math.isfinite(number):
+        return "—"
     if abs(number) < 10:
         return f"{number:.2f}"
     return f"{number:.0f}" if number < 1e6 else f"{number:.0e}"

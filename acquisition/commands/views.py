@@ -2,39 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
-
-from rich.table import Table
 
 from acquisition.commands.determinable import Determinable
 from acquisition.engine.frame_files import frame_bytes
 from acquisition.plan.plan import Plan
-from acquisition.terminal.console import duration_text, out
+from acquisition.terminal.console import duration_text, out, print_lines, print_notes, print_text
+from acquisition.terminal.layout import table_lines, text_table_lines
 from instrument.config.load import Loaded
 
 if TYPE_CHECKING:
     from acquisition.results.finish import Outcome
+    from analysis.report.data import Parameter
 
 
 def print_plan(loaded: Loaded, plan: Plan) -> None:
     """Print the plan's totals and its view angles for each lamp setting."""
-    out.print(f"{loaded.protocol.name}: {loaded.protocol.description}", highlight=False)
-    table = Table("", "", show_header=False, box=None)
-    for row in _plan_rows(loaded, plan):
-        table.add_row(*row)
-    out.print(table)
-    lamp = Table("lamp", "theta_i (deg)", "dphi (deg)", "points", "view angles (deg)")
+    print_text(f"{loaded.protocol.name}: {loaded.protocol.description}")
+    print_lines([*text_table_lines(list(_plan_rows(loaded, plan)), out.width), ""])
+    header = ("setting", "theta_i (deg)", "dphi (deg)", "points", "view angles (deg)")
+    print_lines(table_lines(header, list(_lamp_rows(plan)), out.width))
+
+
+def _lamp_rows(plan: Plan) -> Iterator[tuple[str, ...]]:
     views_deg: dict[int, list[float]] = {}
     for step in plan.points:
         views_deg.setdefault(step.lamp_setting, []).append(step.pose.theta_r)
     positions = {step.lamp_setting: step.pose for step in plan.steps}
     for number, pose in sorted(positions.items()):
         own = views_deg.get(number, [])
-        span = f"{min(own):g} … {max(own):g}" if own else ""
-        angles = (f"{pose.theta_i:g}", f"{pose.dphi:g}")
-        lamp.add_row(str(number + 1), *angles, str(len(own)), span)
-    out.print(lamp)
+        span = f"{min(own):g} … {max(own):g}" if len(own) > 1 else "".join(f"{v:g}" for v in own)
+        yield f"lamp {number + 1}", f"{pose.theta_i:g}", f"{pose.dphi:g}", str(len(own)), span
 
 
 def _plan_rows(loaded: Loaded, plan: Plan) -> Iterator[tuple[str, str]]:
@@ -69,14 +68,16 @@ def _plan_rows(loaded: Loaded, plan: Plan) -> Iterator[tuple[str, str]]:
 
 def print_outcome(outcome: Outcome) -> None:
     """Print the chosen model, its parameters with uncertainty, notes and the report's path."""
+    print_text(outcome.headline)
+    if outcome.parameters:
+        print_lines(["", *parameter_lines(outcome.parameters, out.width), ""])
+    print_notes(outcome.notes)
+    out.print(f"report: {outcome.report}", highlight=False, soft_wrap=True)
+
+
+def parameter_lines(parameters: Sequence[Parameter], width: int) -> list[str]:
+    """Return a table of parameters with their uncertainties as lines."""
     from acquisition.results.summary import value_text  # heavy: only after a scan
 
-    out.print(outcome.headline, highlight=False)
-    if outcome.parameters:
-        table = Table("parameter", "value ± u (k = 1)")
-        for parameter in outcome.parameters:
-            table.add_row(parameter.name, value_text(parameter))
-        out.print(table)
-    for note in outcome.notes:
-        out.print(f"- {note}", highlight=False)
-    out.print(f"report: {outcome.report}", highlight=False, soft_wrap=True)
+    rows = [(p.name, value_text(p)) for p in parameters]
+    return table_lines(("parameter", "value ± u (k = 1)"), rows, width, right=False)

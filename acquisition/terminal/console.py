@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -11,6 +11,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
 from acquisition.plan.plan import Plan, Step
+from acquisition.terminal.layout import note_lines, wrapped
 from instrument.text.terminal_safe import escape_control_characters
 
 
@@ -22,9 +23,28 @@ class EscapingConsole(Console):
         return super().render_str(escape_control_characters(text), **options)
 
 
+_WIDE = 60  # characters that hold a bar beside the numbers of a scan
+
 # Progress and prompts go to standard error: standard output may be JSON.
 console = EscapingConsole(stderr=True, markup=False, emoji=False)
 out = EscapingConsole(markup=False, emoji=False)
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    """Print lines that are laid out for the width of standard output, which is `out.width`."""
+    for line in lines:
+        out.print(line, highlight=False, soft_wrap=True)
+
+
+def print_text(text: str) -> None:
+    """Print a paragraph on standard output."""
+    print_lines(wrapped(text, out.width))
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """Print notes as a list on standard output, those that are empty left out."""
+    for note in filter(None, notes):
+        print_lines(note_lines(note, out.width))
 
 
 def ask(question: str) -> str:
@@ -48,13 +68,10 @@ def progress_bar(plan: Plan, done: frozenset[int]) -> Iterator[Callable[[Step], 
 
     `done`: indices of the steps accepted before, by the run that is being resumed.
     """
-    columns = (
-        TextColumn("{task.description:30}"),
-        BarColumn(),
-        TextColumn("{task.fields[count]}"),
-        TextColumn("time left"),
-        TimeRemainingColumn(compact=True),
-    )
+    pose, count = TextColumn("{task.description:30}"), TextColumn("{task.fields[count]}")
+    left = (TextColumn("time left"), TimeRemainingColumn(compact=True))
+    # In a narrow terminal the numbers stay whole, and what is less needed goes.
+    columns = (pose, BarColumn(), count, *left) if console.width >= _WIDE else (pose, count)
     accepted, total = len(done), len(plan.steps)
     planned_s = sum(step.duration_s for step in plan.steps)
     start_s = int(sum(step.duration_s for step in plan.steps if step.index in done))
