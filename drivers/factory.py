@@ -21,6 +21,7 @@ from instrument.devices import Camera
 if TYPE_CHECKING:
     from drivers.lines.modbus_bus import ModbusBus
     from drivers.lines.modbus_client import BusSettings
+    from drivers.v4l2.settings import V4l2Settings
 
 
 class Lines(Closeable):
@@ -105,9 +106,15 @@ def _limits(axis: Wired) -> Limits:
 def open_camera(camera: V4l2CameraConfig, device: str, clock: Clock) -> Camera:
     """Open the camera; raise `DeviceError` if it cannot do what the rig file asks for."""
     from drivers.v4l2.camera import V4l2Camera
+
+    return V4l2Camera(v4l2_settings(camera, device), clock)
+
+
+def v4l2_settings(camera: V4l2CameraConfig, device: str) -> V4l2Settings:
+    """Return the driver's settings of a rig file's camera, with the path of its device."""
     from drivers.v4l2.settings import V4l2Settings
 
-    settings = V4l2Settings(
+    return V4l2Settings(
         device=device,
         pixel_format=camera.pixel_format,
         width_px=camera.width_px,
@@ -118,5 +125,5 @@ def open_camera(camera: V4l2CameraConfig, device: str, clock: Clock) -> Camera:
         gain=camera.gain,
         exposure_delay_frames=camera.exposure_delay_frames,
         frames_per_s=camera.frames_per_s,
+        limited_range=camera.luma_range == "limited",
     )
-    return V4l2Camera(settings, clock)

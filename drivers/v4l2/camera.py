@@ -76,6 +76,8 @@ class V4l2Camera(Closeable):
         """Return the image format, and every control as read back."""
         s = self._settings
         size = {"size_px": f"{s.width_px} x {s.height_px}", "bit_depth": str(s.bit_depth)}
+        if s.pixel_format == "YUYV":
+            size["luma_range"] = "limited" if s.limited_range else "full"
         return {"pixel_format": s.pixel_format, **size, **self._opened().settings}
 
     def _limitations(self) -> list[str]:

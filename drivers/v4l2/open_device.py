@@ -92,7 +92,23 @@ def _check_format(video: VideoCapture, settings: V4l2Settings, control: int, who
         raise DeviceError(
             f"{who}: OpenCV would convert {found.name} to 8-bit colour; use OpenCV 4.14 or later"
         )
+    _check_range(found, settings, who)
     _check_rate(settings, control, who)
+
+
+def _check_range(found: ioctl.Format, settings: V4l2Settings, who: str) -> None:
+    if found.limited_range == settings.limited_range:
+        return
+    if found.limited_range:
+        raise DeviceError(
+            f"{who}: its {found.name} has limited range: black is 16 and white 235, so counts "
+            "never come to 255 and saturation would not be seen; write luma_range: limited and a "
+            "black_level_dn of at least 16 in the rig file, or use another pixel_format"
+        )
+    raise DeviceError(
+        f"{who}: its {found.name} has the full range, 0 to 255, but the rig file says luma_range: "
+        "limited; remove that entry"
+    )
 
 
 def _check_size(found: ioctl.Format, settings: V4l2Settings, control: int, who: str) -> None:

@@ -19,7 +19,8 @@ class V4l2Settings:
 
     `gain` None leaves the gain as it is (an automatic gain is switched off all the same).
     `frames_per_s` None leaves the rate that the camera chooses for OpenCV's default, 30 per second.
-    A new exposure may take effect `exposure_delay_frames` frames late.
+    A new exposure may take effect `exposure_delay_frames` frames late. `limited_range`: YUYV has
+    black at 16 and white at 235.
     """
 
     device: str
@@ -32,6 +33,7 @@ class V4l2Settings:
     gain: int | None = None
     exposure_delay_frames: int = 2
     frames_per_s: int | None = None
+    limited_range: bool = False
 
     def __post_init__(self) -> None:
         self.exposure_steps(self.min_exposure_s)

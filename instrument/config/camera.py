@@ -10,6 +10,8 @@ from pydantic import Field
 from instrument.config.section import Finite, Name, NotNegative, Positive, Section
 
 V4L2_EXPOSURE_STEP_S = 1e-4
+# ITU-R BT.601: luma of limited range has black at 16 and white at 235.
+LIMITED_BLACK_DN, LIMITED_WHITE_DN = 16, 235
 _BIT_DEPTHS = {"GREY": (8, 8), "YUYV": (8, 8), "Y10": (10, 10), "Y16": (9, 16)}
 
 
@@ -83,6 +85,7 @@ class V4l2CameraConfig(CameraConfig):
     `gain`: in the camera's own unit; if omitted, the camera keeps its gain or has none.
     `exposure_delay_frames`: frames after a change of exposure that may still have the old one.
     `frames_per_s`: requested from the camera; if omitted, 30 per second or what it sets instead.
+    `luma_range`: of YUYV; in the limited range white is 235, and black 16 or more.
     """
 
     driver: Literal["v4l2"]
@@ -91,6 +94,12 @@ class V4l2CameraConfig(CameraConfig):
     gain: int | None = None
     exposure_delay_frames: Annotated[int, Field(ge=0, le=20)] = 2
     frames_per_s: Annotated[int, Field(ge=1, le=1000)] | None = None
+    luma_range: Literal["full", "limited"] = "full"
+
+    @property
+    def max_dn(self) -> int:
+        """Largest count of a pixel, in DN: white of the limited range, if that is used."""
+        return LIMITED_WHITE_DN if self.luma_range == "limited" else super().max_dn
 
     @property
     def exposure_step_s(self) -> float:
@@ -108,6 +117,11 @@ class V4l2CameraConfig(CameraConfig):
         if not low <= self.bit_depth <= high:
             allowed = f"{low}" if low == high else f"{low} to {high}"
             yield "bit_depth", f"{self.bit_depth}; allowed for {self.pixel_format}: {allowed}"
+        if self.luma_range == "limited" and self.pixel_format != "YUYV":
+            yield "luma_range", f"limited; allowed for {self.pixel_format}: full"
+        elif self.luma_range == "limited" and self.black_level_dn < LIMITED_BLACK_DN:
+            text = f"{self.black_level_dn:g}; allowed with luma_range limited: at least "
+            yield "black_level_dn", f"{text}{LIMITED_BLACK_DN}"
 
 
 AnyCamera = Annotated[SimulatedCameraConfig | V4l2CameraConfig, Field(discriminator="driver")]

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from instrument.config.camera import CameraDefects
+from instrument.config.camera import LIMITED_BLACK_DN, LIMITED_WHITE_DN, CameraDefects
 from instrument.devices import Image
 from instrument.geometry import FloatArray
 
-# ITU-R BT.601: 8-bit luma has black at 16 and white at 235.
-BLACK_DN, WHITE_DN, FULL_DN = 16, 235, 255
+_FULL_DN = 255  # white of the full range
 
 
 def true_exposure_s(set_s: float, defects: CameraDefects) -> float:
@@ -46,6 +45,6 @@ def limit_range(image: Image, defects: CameraDefects) -> Image:
     """
     if defects.limited_range == "none" or image.dtype != np.uint8:
         return image
-    scaled = BLACK_DN + image * ((WHITE_DN - BLACK_DN) / FULL_DN)
+    scaled = LIMITED_BLACK_DN + image * ((LIMITED_WHITE_DN - LIMITED_BLACK_DN) / _FULL_DN)
     counts: Image = np.rint(scaled).astype(np.uint8)
     return counts

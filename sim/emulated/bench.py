@@ -17,6 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import assert_never
 
+from drivers.v4l2.ioctl import FULL_RANGE, LIMITED_RANGE
 from instrument.clock import Clock
 from instrument.config.axes import NewportAxis, OrientalAxis, Wired, ZaberAxis
 from instrument.config.camera import CameraDefects, V4l2CameraConfig
@@ -126,6 +127,7 @@ def _capabilities(camera: V4l2CameraConfig, defects: CameraDefects) -> Capabilit
     frames_per_s = camera.frames_per_s or _FRAMES_PER_S
     return Capabilities(
         defects=defects,
+        quantization=LIMITED_RANGE if camera.luma_range == "limited" else FULL_RANGE,
         formats=(camera.pixel_format,),
         sizes=((camera.width_px, camera.height_px),),
         frames_per_s=frames_per_s,

@@ -9,9 +9,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from drivers.v4l2 import ioctl
+from instrument.config.camera import CameraDefects
 from instrument.errors import DeviceError
 from sim.emulated.v4l2.device import CameraFaults
 from tests.support.v4l2.remote_camera import (
@@ -112,6 +114,42 @@ def test_padded_rows_are_refused(remote: RemoteCamera, scene: LevelScene) -> Non
         pytest.raises(DeviceError, match="a row has 160 bytes, 128 of them pixels"),
     ):
         remote.ask("open", SETTINGS)
+
+
+LIMITED = {"quantization": ioctl.LIMITED_RANGE}
+UNSTATED = {"quantization": ioctl.DEFAULT_RANGE}  # of sRGB, which means limited
+YUYV = replace(SETTINGS, pixel_format="YUYV", bit_depth=8)
+
+
+@pytest.mark.parametrize("declared", [LIMITED, UNSTATED])
+def test_a_limited_range_is_refused_unless_the_rig_file_says_so(
+    remote: RemoteCamera, scene: LevelScene, declared: dict[str, int]
+) -> None:
+    with served(remote, scene, **declared):
+        with pytest.raises(DeviceError, match=f"{WHO}: its YUYV has limited range: .* white 235"):
+            remote.ask("open", YUYV)
+        remote.ask("open", replace(YUYV, limited_range=True))
+        assert len(remote.grab(1)) == 1
+        remote.ask("open", replace(YUYV, pixel_format="GREY"))  # counts of the sensor
+
+
+def test_a_full_range_is_refused_where_the_rig_file_says_limited(
+    remote: RemoteCamera, scene: LevelScene
+) -> None:
+    with (
+        served(remote, scene),
+        pytest.raises(DeviceError, match=f"{WHO}: its YUYV has the full range, .* remove that"),
+    ):
+        remote.ask("open", replace(YUYV, limited_range=True))
+
+
+def test_white_of_a_limited_range_is_235(remote: RemoteCamera, scene: LevelScene) -> None:
+    scene.render = lambda exposure, _: np.full(  # type: ignore[method-assign]  # another picture
+        (exposure.height_px, exposure.width_px), 255, np.uint8
+    )
+    with served(remote, scene, defects=CameraDefects(limited_range="declared")):
+        remote.ask("open", replace(YUYV, limited_range=True))
+        assert set(remote.grab(1)[0].image.ravel()) == {235}
 
 
 def test_a_frame_rate_beyond_the_camera_is_refused(remote: RemoteCamera, scene: LevelScene) -> None:

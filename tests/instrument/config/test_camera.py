@@ -2,6 +2,7 @@
 
 import pytest
 
+from instrument.config.camera import V4l2CameraConfig
 from tests.support.config.texts import RIG, changed, problems
 
 
@@ -23,3 +24,41 @@ def test_a_bit_depth_that_the_pixel_format_does_not_have_is_refused(
     rig = changed(rig, "bit_depth: 12", f"bit_depth: {bit_depth}")
     expected = f"camera.bit_depth: {bit_depth}; allowed for {pixel_format}: {allowed}"
     assert any(p.endswith(expected) for p in problems(rig=rig))
+
+
+YUYV = "camera:\n  driver: v4l2\n  device: /dev/video0\n  pixel_format: YUYV\n  luma_range: limited"
+
+
+@pytest.mark.parametrize(
+    ("pixel_format", "black_level", "message"),
+    [
+        ("YUYV", 20.0, ""),
+        ("YUYV", 8.0, "camera.black_level_dn: 8; allowed with luma_range limited: at least 16"),
+        ("GREY", 20.0, "camera.luma_range: limited; allowed for GREY: full"),
+    ],
+)
+def test_a_limited_range_is_for_yuyv_and_has_its_black_at_16(
+    pixel_format: str, black_level: float, message: str
+) -> None:
+    rig = changed(RIG, "camera:\n  driver: simulated", YUYV.replace("YUYV", pixel_format))
+    rig = changed(rig, "bit_depth: 12", "bit_depth: 8")
+    rig = changed(rig, "black_level_dn: 64.0", f"black_level_dn: {black_level}")
+    rig = changed(rig, "read_noise_electrons: 8.0", "read_noise_electrons: 80.0")
+    found = [p for p in problems(rig=rig) if "camera." in p]
+    assert [p.split(": ", 1)[1] for p in found] == ([message] if message else [])
+
+
+def test_full_scale_of_the_limited_range_is_235() -> None:
+    camera = {
+        "driver": "v4l2", "device": "/dev/video0", "pixel_format": "YUYV", "width_px": 64,
+        "height_px": 48, "field_width_mm": 72.0, "axis_row_px": 24.0, "axis_column_px": 32.0,
+        "bit_depth": 8, "full_well_electrons": 10_000.0, "read_noise_electrons": 8.0,
+        "dark_current_electrons_per_s": 20.0, "black_level_dn": 16.0, "min_exposure_s": 0.001,
+        "max_exposure_s": 0.1, "frame_overhead_s": 0.01,
+    }  # fmt: skip
+    full, limited = (
+        V4l2CameraConfig.model_validate({**camera, "luma_range": luma}) for luma in
+        ("full", "limited")
+    )  # fmt: skip
+    assert (full.max_dn, limited.max_dn) == (255, 235)
+    assert limited.electrons_per_dn == pytest.approx(10_000 / (235 - 16))
