@@ -20,18 +20,41 @@ _QUIET_S = 0.05
 _STOP_ID = framing.IDS - 1  # kept for stops, so that no query takes their replies
 
 
+class Refused(DeviceError):
+    """The device has rejected a command, and says why."""
+
+
 class ZaberPort:
     """One axis of a device on a line that others may share.
 
     Each query has a number that its reply repeats, so a late reply is never taken for another's.
     Numbers repeat after 99 queries; therefore the line is drained while a reply is pending. After
     the port was gone, the device must report the serial number that it had before.
+
+    A device adds a checksum to its replies only if its setting comm.checksum is 1. Without it a
+    wrong digit would pass as a position, so it is switched on (`switched_on`) and then required.
+    The device keeps the setting; the maker's own libraries read replies of both forms.
     """
 
     def __init__(self, line: Line, device: int, axis: int, who: str) -> None:
         self.line, self.device, self.axis, self.who = line, device, axis, who
         self._next_id, self._openings = 0, line.openings
+        self.checked = self.switched_on = False
+        self._require_checksums()
         self.serial = self.query("get system.serial", axis=0).data
+
+    def _require_checksums(self) -> None:
+        if not self.query("get deviceid", axis=0).checked:
+            log.warning("%s: its replies carry no checksum: comm.checksum is set to 1", self.who)
+            try:
+                self.query("set comm.checksum 1", axis=0)
+            except Refused as error:
+                raise DeviceError(
+                    f"{error}: its replies carry no checksum, so that a wrong digit would pass as "
+                    "a position: set comm.checksum to 1 with the maker's program (Zaber Launcher)"
+                ) from error
+            self.switched_on = True
+        self.checked = True
 
     def query(self, text: str, axis: int | None = None, tries: int = _TRIES) -> Reply:
         """Return the reply to a command that changes nothing and may be repeated."""
@@ -45,7 +68,7 @@ class ZaberPort:
                 self._require_same_device()
             reply = self._exchange(text, self.axis if axis is None else axis)
         if not reply.accepted:
-            raise DeviceError(f"{self.who}: refused {text!r}: {reply.data}")
+            raise Refused(f"{self.who}: refused {text!r}: {reply.data}")
         return reply
 
     def _exchange(self, text: str, axis: int) -> Reply:
@@ -71,7 +94,7 @@ class ZaberPort:
         self.line.write_at_once(framing.command(self.device, self.axis, _STOP_ID, "stop"))
 
     def _own_reply(self, line: bytes, axis: int, number: int) -> Reply | None:
-        reply = framing.reply_of(line)
+        reply = framing.reply_of(line, self.checked)
         expected = (self.device, axis, number)
         if reply is None or (reply.device, reply.axis, reply.message_id) != expected:
             return None
@@ -139,7 +162,11 @@ class ZaberStage(MotorStage):
 
     def _own_settings(self) -> dict[str, str]:
         rate = self._whole("maxspeed") / framing.SPEED_PER_MICROSTEP
-        return {"speed_deg_per_s": f"{rate / self._steps_per_deg:g}"}
+        by = " (set by this program)" if self._port.switched_on else ""
+        return {
+            "speed_deg_per_s": f"{rate / self._steps_per_deg:g}",
+            "comm.checksum": f"1{by}",
+        }
 
     def _send_home(self) -> None:
         self._send_motion("home")

@@ -44,7 +44,7 @@ _REPLY = re.compile(rb"@(\d\d) (\d) (?:(\d\d) )?(OK|RJ) (IDLE|BUSY) ([!-~]{2}) ?
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reply:
-    """Parsed reply; `warning` is the most urgent one."""
+    """Parsed reply; `warning` is the most urgent one, `checked` true if it had a checksum."""
 
     device: int
     axis: int
@@ -53,6 +53,7 @@ class Reply:
     busy: bool
     warning: str
     data: str
+    checked: bool
 
 
 def homed(flags: Sequence[str]) -> bool:
@@ -77,14 +78,14 @@ def command(device: int, axis: int, message_id: int, text: str) -> bytes:
     return b"/" + body + b":" + checksum(body) + END
 
 
-def reply_of(line: bytes) -> Reply | None:
+def reply_of(line: bytes, require_checksum: bool = True) -> Reply | None:
     """Parse a line; None for alerts, noise, and replies with a wrong checksum.
 
     The checksum finds any single wrong byte and misses one in 256 of larger errors. Two exchanged
-    bytes have the same sum.
+    bytes have the same sum. A device sends it only if its setting comm.checksum is 1.
     """
     body, colon, check = line.partition(b":")
-    if not colon or check.upper() != checksum(body[1:]):
+    if check.upper() != checksum(body[1:]) if colon else require_checksum:
         return None
     found = _REPLY.fullmatch(body)
     if found is None:
@@ -98,4 +99,5 @@ def reply_of(line: bytes) -> Reply | None:
         busy=status == b"BUSY",
         warning=warning.decode("ascii"),
         data=data.decode("ascii").strip(),
+        checked=bool(colon),
     )

@@ -1,4 +1,11 @@
-"""Emulated Zaber rotary stage (ASCII protocol): replies, checksums and warning flags."""
+"""Emulated Zaber rotary stage (ASCII protocol): replies, checksums and warning flags.
+
+Transcripts: replies have the form that the tests of the maker's MATLAB toolbox quote from devices
+(`@01 0 OK IDLE -- 50001`), and the maker's library zaber-motion drives this stage in the tests. A
+reply carries a checksum if the setting comm.checksum is 1, and not because the command had one: the
+maker's libraries read both forms, and public programs set it. Not verified on a device: that last
+rule, the value of deviceid (59999 is of no real device), and the time of a reply (here none).
+"""
 
 from __future__ import annotations
 
@@ -8,6 +15,7 @@ from sim.emulated.motor import Motor
 
 MICROSTEPS_PER_DEG = 1_536_000 / 360  # X-RSW60
 _SPEED_PER_MICROSTEP = 1.6384
+_SETTABLE = {"maxspeed": range(1, 1 << 31), "comm.checksum": range(2)}
 _COMMAND = re.compile(r"/(\d+)?(?: (\d+))?(?: (\d\d))?(?: ([a-z].*))?")
 
 
@@ -34,6 +42,7 @@ class ZaberController:
             "version.build": 15000,
             "comm.protocol": 2,
             "comm.address": device,
+            "comm.checksum": 0,
             "resolution": 64,
             "peripheral.id": 0,
             "limit.min": round(low * self._per_deg),
@@ -62,7 +71,8 @@ class ZaberController:
         status = "BUSY" if self.motor.moving else "IDLE"
         head = f"{self.device:02d} {axis}" + (f" {number}" if number else "")
         body = f"{head} {flag} {status} {(self._warnings() or ['--'])[0]} {data}"
-        return f"@{body}:{_checksum(body):02X}\r\n".encode("ascii")
+        check = f":{_checksum(body):02X}" if self.settings.get("comm.checksum") else ""
+        return f"@{body}{check}\r\n".encode("ascii")
 
     def _execute(self, words: str) -> tuple[str, str]:
         """Execute a command; return OK or RJ, and the reply's data."""
@@ -87,9 +97,9 @@ class ZaberController:
 
     def _set(self, rest: str) -> tuple[str, str]:
         setting, _, value = rest.partition(" ")
-        if setting != "maxspeed":
+        if setting not in _SETTABLE.keys() & self.settings.keys():
             return "RJ", "BADCOMMAND"
-        if not value.isdigit() or int(value) == 0:
+        if not value.isdigit() or int(value) not in _SETTABLE[setting]:
             return "RJ", "BADDATA"
         self.settings[setting] = int(value)
         return "OK", "0"

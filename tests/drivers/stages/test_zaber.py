@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.lines.serial_line import Line
+from drivers.lines.serial_line import Garbled, Line
 from drivers.stages.zaber import ZaberStage
 from instrument.clock import SystemClock
+from instrument.errors import DeviceError
 from sim.emulated.motor import Motor
 from sim.emulated.wire import PtyWire
 from sim.emulated.zaber_controller import MICROSTEPS_PER_DEG, ZaberController
@@ -34,3 +35,47 @@ def test_the_final_position_is_read_at_rest_even_if_the_move_ends_during_a_reply
         stage.home()
         stage.start_move(0.005)  # so short that even its beginning is within the tolerance
         assert stage.wait() == pytest.approx(0.005, abs=1e-3)
+
+
+def opened(controller: ZaberController, wire: PtyWire) -> ZaberStage:
+    """A stage on a line that is closed with it."""
+    clock = SystemClock()
+    line = Line("theta_r", wire.port, 115200, clock)
+    try:
+        return ZaberStage("theta_r", line, 1, 1, MICROSTEPS_PER_DEG, LIMITS, clock)
+    except BaseException:
+        line.close()
+        raise
+
+
+@pytest.mark.parametrize("before", [0, 1])
+def test_a_device_without_checksums_is_told_to_send_them(before: int) -> None:
+    controller = ZaberController(Motor(SLOW, SystemClock()))
+    controller.settings["comm.checksum"] = before
+    with PtyWire([controller]) as wire:
+        stage = opened(controller, wire)
+        assert stage.status().homed is False
+        said = stage.settings()["comm.checksum"]
+        stage.close()
+        sent = b"".join(data for _, data in wire.seen)
+    assert controller.settings["comm.checksum"] == 1
+    assert ("set by this program" in said) == (before == 0)
+    assert (b"set comm.checksum 1" in sent) == (before == 0)
+
+
+def test_a_reply_that_loses_its_checksum_later_is_not_believed() -> None:
+    controller = ZaberController(Motor(SLOW, SystemClock()))
+    with PtyWire([controller]) as wire:
+        stage = opened(controller, wire)
+        controller.settings["comm.checksum"] = 0  # another program, or its factory settings
+        with pytest.raises(Garbled, match=r"only b'@01 1 \d\d OK IDLE WH"):
+            stage.status()
+        stage.close()
+
+
+def test_a_device_that_cannot_send_checksums_is_refused_and_says_what_to_do() -> None:
+    controller = ZaberController(Motor(SLOW, SystemClock()))
+    del controller.settings["comm.checksum"]  # an old firmware might not know it
+    refused = pytest.raises(DeviceError, match=r"BADCOMMAND.*no checksum.*set comm.checksum to 1")
+    with PtyWire([controller]) as wire, refused:
+        opened(controller, wire)

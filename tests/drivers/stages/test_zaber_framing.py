@@ -17,9 +17,19 @@ def test_replies_are_parsed() -> None:
     body = b"01 1 07 OK BUSY WR 153600"
     reply = zaber_framing.reply_of(b"@" + body + b":" + zaber_framing.checksum(body))
     assert reply == zaber_framing.Reply(
-        device=1, axis=1, message_id=7, accepted=True, busy=True, warning="WR", data="153600"
-    )
+        device=1, axis=1, message_id=7, accepted=True, busy=True, warning="WR", data="153600",
+        checked=True,
+    )  # fmt: skip
     assert not zaber_framing.homed([reply.warning])
+
+
+def test_a_reply_without_a_checksum_is_read_only_if_none_is_required() -> None:
+    line = b"@01 0 01 OK IDLE WH 59999"
+    assert zaber_framing.reply_of(line) is None
+    reply = zaber_framing.reply_of(line, require_checksum=False)
+    assert reply is not None
+    assert (reply.data, reply.checked) == ("59999", False)
+    assert zaber_framing.reply_of(line + b":00", require_checksum=False) is None  # a wrong one
 
 
 @given(st.binary(max_size=60))
