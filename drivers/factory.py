@@ -37,10 +37,12 @@ class Lines(Closeable):
         """Close all ports; safe to call twice."""
         self._closing.close()
 
-    def serial(self, who: str, port: str, baudrate: int, xonxoff: bool = False) -> Line:
+    def serial(
+        self, who: str, port: str, baudrate: int, reply_s: float, xonxoff: bool = False
+    ) -> Line:
         """Return the line of a serial port; the first call opens it."""
         if port not in self._serial:
-            line = Line(who, port, baudrate, self.clock, xonxoff)
+            line = Line(who, port, baudrate, self.clock, xonxoff, reply_s)
             self._serial[port] = self._closing.enter_context(line)
         return self._serial[port]
 
@@ -70,14 +72,15 @@ def open_stage(name: str, axis: Wired, port: str, lines: Lines) -> MotorStage:
 def _newport(name: str, axis: NewportAxis, port: str, lines: Lines) -> MotorStage:
     from drivers.stages.newport import BAUDRATE, NewportStage
 
-    line = lines.serial(name, port, BAUDRATE[axis.model], xonxoff=axis.model == "SMC100")
+    baudrate, xonxoff = BAUDRATE[axis.model], axis.model == "SMC100"
+    line = lines.serial(name, port, baudrate, axis.reply_s, xonxoff)
     return NewportStage(name, line, axis.address, axis.model, _limits(axis), lines.clock)
 
 
 def _zaber(name: str, axis: ZaberAxis, port: str, lines: Lines) -> MotorStage:
-    from drivers.stages.zaber import BAUDRATE, ZaberStage
+    from drivers.stages.zaber import ZaberStage
 
-    line = lines.serial(name, port, BAUDRATE)
+    line = lines.serial(name, port, axis.baudrate, axis.reply_s)
     device, number, per_deg = axis.device, axis.axis, axis.microsteps_per_deg
     return ZaberStage(name, line, device, number, per_deg, _limits(axis), lines.clock)
 
@@ -86,7 +89,7 @@ def _oriental(name: str, axis: OrientalAxis, port: str, lines: Lines) -> MotorSt
     from drivers.lines.modbus_client import BusSettings
     from drivers.stages.oriental import OrientalStage
 
-    bus = lines.modbus(name, BusSettings(port, axis.baudrate, axis.parity))
+    bus = lines.modbus(name, BusSettings(port, axis.baudrate, axis.parity, axis.reply_s))
     return OrientalStage(name, bus, axis.unit, axis.steps_per_deg, _limits(axis), lines.clock)
 
 

@@ -13,6 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
+REPLY_S = 0.15
+"""Time allowed for a controller's answer in s, unless the rig file gives its own `reply_s`.
+
+Controllers answer within 10 to 50 ms. A stop waits no longer than this, and a lost answer is asked
+for again before the status of a moving stage is too old.
+"""
 Surface = Literal["sample", "white tile"]
 
 

@@ -24,6 +24,7 @@ from drivers.lines.serial_line import (
     BY_ID,
     REOPEN_EVERY_S,
     REOPEN_S,
+    SLOW_LINE,
     Garbled,
     NoReply,
     PortGone,
@@ -31,6 +32,7 @@ from drivers.lines.serial_line import (
 )
 from instrument.clock import Clock
 from instrument.closeable import Closeable
+from instrument.devices import REPLY_S
 from instrument.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -41,6 +43,7 @@ AnswerLost = (NoReply, Garbled, PortGone)  # the device may or may not have exec
 
 TRIES = 3
 GIVE_UP_S = 1.5  # no exchange begins later than this after the first: an error within 2 s
+GIVE_UP_ANSWERS = GIVE_UP_S / REPLY_S  # on a slow line: as many answers' time
 MAX_LATE_ANSWERS = 2  # earlier answers that may arrive one by one while resynchronising
 SILENCE_S = 0.00175  # between frames, above 19200 baud (Modbus over serial line, 2.5.1.1)
 # ValueError, TypeError, AttributeError: another thread has closed the port meanwhile.
@@ -160,7 +163,7 @@ class ModbusBus(Closeable):
             )
         return NoReply(
             f"{who}: no answer within {within_s:g} s: look at its power, at its unit address and "
-            f"at the cable of {self.port}"
+            f"at the cable of {self.port}{SLOW_LINE}"
         )
 
     def _lost(self, who: str, why: str) -> PortGone:
@@ -194,7 +197,8 @@ class ModbusUnit:
 
     def deadline_s(self) -> float:
         """Return the time of the bus's clock until which an exchange may still begin."""
-        return self._bus.clock.now_s() + GIVE_UP_S
+        reply_s = self._bus.settings.reply_s
+        return self._bus.clock.now_s() + max(GIVE_UP_S, GIVE_UP_ANSWERS * reply_s)
 
     def read(self, register: int, count: int, until_s: float | None = None) -> list[int]:
         """Return `count` registers from `register` on; up to three tries, none after `until_s`."""

@@ -17,8 +17,9 @@ import serial
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException, ModbusIOException
 
-from drivers.lines.serial_line import ECHO, REPLY_S, WRITE_S
+from drivers.lines.serial_line import ECHO, WRITE_S
 from instrument.clock import Clock
+from instrument.devices import REPLY_S
 from instrument.errors import InputError
 
 READ = b"\x03"  # function code: read holding registers

@@ -19,16 +19,16 @@ from typing import TYPE_CHECKING, TypeVar
 from drivers.lines.priority_lock import PriorityLock
 from instrument.clock import Clock
 from instrument.closeable import Closeable
+from instrument.devices import REPLY_S
 from instrument.errors import DeviceError
 
 if TYPE_CHECKING:
     import serial
 
-REPLY_S = 0.15  # controllers answer within 10 to 50 ms; a stop waits no longer than this, and a
-# lost answer is asked for again before the status of a moving stage is too old
 WRITE_S = 0.5  # pyserial also counts the time for which a busy computer suspends the process
 REOPEN_S, REOPEN_EVERY_S = 2.0, 0.05  # a stop waits so long for a port that has vanished
 ECHO = "returns every request, as a two-wire RS-485 adapter may: the echo is skipped"
+SLOW_LINE = ", or give a slow line more time (reply_s in the rig file)"
 BY_ID = ", and name it by its link in /dev/serial/by-id"
 MAX_LINE_BYTES = 1024  # anything longer is noise
 _PORT_LOST = (OSError, ValueError, TypeError, termios.error)  # the last three: closed meanwhile
@@ -265,8 +265,8 @@ class Line(Closeable):
         if self._buffer:
             return self._garbled(who, bytes(self._buffer))
         return NoReply(
-            f"{who}: no answer within {self.reply_s:g} s: look at its power and at the cable "
-            f"of {self.port}"
+            f"{who}: no answer within {self.reply_s:g} s: look at its power and at the cable of "
+            f"{self.port}{SLOW_LINE}"
         )
 
     def _garbled(self, who: str, received: bytes) -> Garbled:

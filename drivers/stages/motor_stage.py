@@ -10,16 +10,16 @@ import logging
 from abc import ABC, abstractmethod
 
 from drivers.stages.motion import STALLED_S, HomingMonitor, Limits, MoveMonitor, Status
-from drivers.stages.watchdog import SILENT_S, Watchdog
+from drivers.stages.watchdog import Watchdog
 from instrument.clock import Clock
 from instrument.closeable import Closeable
+from instrument.devices import REPLY_S
 from instrument.errors import DeviceError
 
 log = logging.getLogger(__name__)
 
 POLL_S = 0.005
 _ROUNDING_DEG = 1e-9
-_NO_STATUS = f"no status for {SILENT_S:g} s while it moved, so it was told to stop"
 
 
 class Stopped(DeviceError):
@@ -36,14 +36,19 @@ class MotorStage(ABC):
     """True for controllers that refuse to search for a reference that they have."""
 
     def __init__(
-        self, name: str, limits: Limits, clock: Clock, line: Closeable | None = None
+        self,
+        name: str,
+        limits: Limits,
+        clock: Clock,
+        line: Closeable | None = None,
+        reply_s: float = REPLY_S,
     ) -> None:
         self.name, self._limits, self._clock, self._line = name, limits, clock, line
         self._target_deg: float | None = None
         self._from_deg = 0.0
         self._started_s = 0.0
         self._stopped = False
-        self.watchdog = Watchdog(name, self._probe, self._stop_unwatched, clock)
+        self.watchdog = Watchdog(name, self._probe, self._stop_unwatched, clock, reply_s)
 
     # To be provided by a driver.
 
@@ -236,16 +241,21 @@ class MotorStage(ABC):
             now = self.watchdog.poll(self.status)
         except DeviceError as error:
             if self.watchdog.fired:
-                raise type(error)(f"{error}; {_NO_STATUS}") from error
+                raise type(error)(f"{error}; {self._no_status}") from error
             raise
         if self.watchdog.fired:
             self._target_deg = None
-            raise DeviceError(f"{self.name}: {_NO_STATUS}: look at its cable, then home it")
+            raise DeviceError(f"{self.name}: {self._no_status}: look at its cable, then home it")
         if self._stopped:
             self._target_deg = None
             raise Stopped(f"{self.name}: stopped at {now.position_deg:g} deg")
         self._refuse_fault(now)
         return now
+
+    @property
+    def _no_status(self) -> str:
+        silent_s = self.watchdog.silent_s
+        return f"no status for {silent_s:g} s while it moved, so it was told to stop"
 
     def _probe(self) -> bool:
         """Ask for the status without retries; True if the controller answers."""
@@ -261,7 +271,7 @@ class MotorStage(ABC):
         try:
             self.stop()
         except DeviceError as error:
-            log.error("%s: %s; the stop failed too: %s", self.name, _NO_STATUS, error)
+            log.error("%s: %s; the stop failed too: %s", self.name, self._no_status, error)
 
     def _check_arrival(self, now: Status) -> float:
         self._refuse_lost_reference(now)

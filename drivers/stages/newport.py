@@ -119,7 +119,7 @@ class NewportStage(MotorStage):
     def __init__(
         self, name: str, line: Line, address: int, model: str, limits: Limits, clock: Clock
     ) -> None:
-        super().__init__(name, limits, clock, line)
+        super().__init__(name, limits, clock, line, line.reply_s)
         self._model = model
         self._who = f"{name} (Newport {model}, address {address} on {line.port})"
         self._port = NewportPort(line, address, self._who)

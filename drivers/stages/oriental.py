@@ -42,7 +42,7 @@ class OrientalStage(MotorStage):
                 f"tolerance_deg: {limits.tolerance_deg:g} deg: less than half a step "
                 f"({0.5 / steps_per_deg:g} deg) cannot be kept"
             )
-        super().__init__(name, limits, clock)
+        super().__init__(name, limits, clock, reply_s=bus.settings.reply_s)
         self._unit, self._steps_per_deg = unit, steps_per_deg
         self._drive = ModbusUnit(bus, name, unit, framing.DIRECT_DATA, _RESYNC_COUNTS)
         self._stops, self._cleared = 0, -1  # stops sent; how many of them are cleared in 007D

@@ -7,25 +7,43 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from instrument.clock import Clock
+from instrument.devices import REPLY_S
 
 SILENT_S = 0.5  # a status older than this is out of date
+# Between the beginning of a move and the status after one lost answer: three answers to send it,
+# two to a probe of which one is lost, quiet, one to get in step, two of the status. Answers that
+# come take half of the time allowed or less.
+ANSWERS = 8
 _TICK_S = 0.02
-_PROBE_AFTER_S, _PROBE_BEFORE_S = 0.1, 0.3  # a probe must have failed before the time is up
+_PROBE_AFTER_S = 0.1
+_AFTER_PROBE_S = 0.05  # beyond a last answer: a probe must have failed before the time is up
 
 T = TypeVar("T")
+
+
+def silence_allowed_s(reply_s: float) -> float:
+    """Return the age in s at which a status is out of date, on a line that answers in `reply_s`."""
+    return SILENT_S + ANSWERS * max(reply_s - REPLY_S, 0.0)
 
 
 class Watchdog:
     """One thread that runs while something moves.
 
     The program reads the status through `poll`. While nobody polls, the thread calls `probe`,
-    which asks once, without retries, and returns True for an answer. After `SILENT_S` without an
+    which asks once, without retries, and returns True for an answer. After `silent_s` without an
     answer to either, the thread calls `stop`. Neither `probe` nor `stop` may raise.
     """
 
     def __init__(
-        self, name: str, probe: Callable[[], bool], stop: Callable[[], None], clock: Clock
+        self,
+        name: str,
+        probe: Callable[[], bool],
+        stop: Callable[[], None],
+        clock: Clock,
+        reply_s: float = REPLY_S,
     ) -> None:
+        self.silent_s = silence_allowed_s(reply_s)
+        self._probe_before_s = self.silent_s - reply_s - _AFTER_PROBE_S
         self._name, self._probe, self._stop, self._clock = name, probe, stop, clock
         self._asking = threading.Lock()
         self._over = threading.Event()
@@ -56,12 +74,12 @@ class Watchdog:
     def _watch(self, over: threading.Event) -> None:
         while not over.wait(_TICK_S):
             silent_s = self._clock.now_s() - self._answered_s
-            if silent_s > SILENT_S:
+            if silent_s > self.silent_s:
                 self.fired = True
                 over.set()
                 self._stop()
                 return
-            if _PROBE_AFTER_S < silent_s < _PROBE_BEFORE_S:
+            if _PROBE_AFTER_S < silent_s < self._probe_before_s:
                 self._probe_unless_polled()
 
     def _probe_unless_polled(self) -> None:

@@ -12,7 +12,6 @@ from drivers.stages.zaber_framing import Reply
 from instrument.clock import Clock
 from instrument.errors import DeviceError
 
-BAUDRATE = 115200
 log = logging.getLogger(__name__)
 
 _TRIES = 3
@@ -114,7 +113,7 @@ class ZaberStage(MotorStage):
         limits: Limits,
         clock: Clock,
     ) -> None:
-        super().__init__(name, limits, clock, line)
+        super().__init__(name, limits, clock, line, line.reply_s)
         self._who = f"{name} (Zaber, device {device} axis {axis} on {line.port})"
         self._port = ZaberPort(line, device, axis, self._who)
         self._steps_per_deg = microsteps_per_deg

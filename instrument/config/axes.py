@@ -13,6 +13,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from instrument.config.section import Finite, NotNegative, Positive, Section
+from instrument.devices import REPLY_S
 
 AXES = ("theta_i", "dphi", "theta_r")
 AxisName = Literal["theta_i", "dphi", "theta_r"]
@@ -20,6 +21,8 @@ EMULATED = "emulated"
 """Value of `port` or `device` that connects the driver to an emulated device."""
 
 LEAST_TOLERANCE_DEG = 0.01
+
+Baudrate = Annotated[int, Field(ge=9600, le=921600)]
 
 # pyserial knows more kinds of address; one of them, spy://, writes to any file.
 Port = Annotated[
@@ -92,14 +95,26 @@ class SimulatedAxis(_MotorAxis):
 
 
 class _WiredAxis(_MotorAxis):
-    """Motor whose controller is connected to a port."""
+    """Motor whose controller is connected to a port and answers within `reply_s`.
+
+    Allow twice the longest time that a slow gateway or serial server takes: a moving stage is
+    stopped when its last status is older than 0.5 s, or more by eight times what `reply_s`
+    exceeds 0.15 s.
+    """
 
     port: Port
+    reply_s: Annotated[float, Field(ge=0.05, le=2.0)] = REPLY_S
 
     @property
     def place(self) -> str:
         """Address of the motor on its port, which several may share."""
         keys = ("address", "device", "axis", "unit")
+        return " ".join(f"{key} {getattr(self, key)}" for key in keys if hasattr(self, key))
+
+    @property
+    def line(self) -> str:
+        """Settings of its port, which all axes on it share."""
+        keys = ("model", "baudrate", "parity", "reply_s")
         return " ".join(f"{key} {getattr(self, key)}" for key in keys if hasattr(self, key))
 
 
@@ -118,6 +133,7 @@ class ZaberAxis(_WiredAxis):
     device: Annotated[int, Field(ge=1, le=99)] = 1
     axis: Annotated[int, Field(ge=1, le=9)] = 1
     microsteps_per_deg: Positive
+    baudrate: Baudrate = 115200
 
 
 class OrientalAxis(_WiredAxis):
@@ -130,7 +146,7 @@ class OrientalAxis(_WiredAxis):
     driver: Literal["oriental"]
     unit: Annotated[int, Field(ge=1, le=247)] = 1
     steps_per_deg: Positive
-    baudrate: Annotated[int, Field(ge=9600, le=921600)] = 115200
+    baudrate: Baudrate = 115200
     parity: Literal["E", "N", "O"] = "E"
 
 

@@ -115,7 +115,7 @@ class Rig(Section):
             yield "simulation", text
 
     def _port_conflicts(self) -> Iterator[tuple[str, str]]:
-        """Require one kind of driver per port, and a different address for each axis on it."""
+        """Require per port one kind of driver and line, and an address for each axis on it."""
         axes = {name: self.axes[name] for name in AXES}
         wired = {n: a for n, a in axes.items() if isinstance(a, Wired) and a.port != EMULATED}
         for (one, first), (other, second) in combinations(wired.items(), 2):
@@ -124,6 +124,9 @@ class Rig(Section):
             if first.driver != second.driver:
                 text = f"{first.driver} and {second.driver}; allowed on one port: one driver"
                 yield "axes", f"{one} and {other} are both at {first.port}, with {text}"
+            elif first.line != second.line:
+                text = f"with {first.line} and {second.line}; allowed on one port: the same"
+                yield "axes", f"{one} and {other} are both at {first.port}, {text}"
             elif first.place == second.place:
                 text = f"{first.place}; allowed: an address for each"
                 yield "axes", f"{one} and {other} are both at {first.port}, {text}"
