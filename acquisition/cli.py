@@ -19,6 +19,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
+from acquisition.terminal.streams import lasting_streams
 from instrument.errors import GonioError, OperatorStop, StorageError
 from instrument.text.terminal_safe import escape_control_characters
 
@@ -26,6 +27,13 @@ from instrument.text.terminal_safe import escape_control_characters
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 STOPPING_S = 2.0  # time allowed for stopping all devices
+_STOPS: dict[int, str] = {
+    signal.SIGINT: "stopped by the operator",
+    signal.SIGTERM: "stopped by the operator (SIGTERM)",
+    signal.SIGQUIT: "stopped by the operator (SIGQUIT)",
+    signal.SIGHUP: "stopped: the terminal was closed (SIGHUP)",
+}
+"""Signals that end the command, with the text of the event in the record."""
 
 
 class _Commands(TyperGroup):
@@ -246,25 +254,33 @@ def main() -> None:
     """Entry point of the `gonio` command."""
     # Hardly any object is part of a cycle: rarer collections save a tenth of a short run.
     gc.set_threshold(100_000, 20, 20)
-    stop_on_signals()
     try:
-        app()
+        with lasting_streams():
+            stop_on_signals()
+            app()
     except KeyboardInterrupt:
         sys.exit(OperatorStop.exit_code)
+    except StorageError as error:  # of the help, and of the last flush
+        sys.stderr.write(f"{error}\n")
+        sys.exit(error.exit_code)
 
 
 def stop_on_signals() -> None:
-    """Make Ctrl-C and SIGTERM end the command; a second one within STOPPING_S is ignored."""
+    """Make Ctrl-C, SIGTERM, SIGQUIT and a closed terminal end the command.
+
+    A second signal within STOPPING_S is ignored, and a SIGHUP that was ignored before: `nohup`.
+    """
     last_s = -math.inf
 
     def interrupt(number: int, frame: object) -> None:  # noqa: ARG001 - a signal handler's form
         nonlocal last_s
         soon, last_s = time.monotonic() - last_s < STOPPING_S, time.monotonic()
         if not soon:
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt(_STOPS[number])
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, interrupt)
+    for number in _STOPS:
+        if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, interrupt)
 
 
 @contextmanager
@@ -276,8 +292,8 @@ def errors_as_exit_codes() -> Iterator[None]:
         _exit(str(error), error.exit_code)
     except OSError as error:
         _exit(str(error), StorageError.exit_code)
-    except KeyboardInterrupt:
-        _exit("stopped by the operator", OperatorStop.exit_code)
+    except KeyboardInterrupt as stop:
+        _exit(str(stop) or "stopped by the operator", OperatorStop.exit_code)
 
 
 def _exit(message: str, code: int) -> NoReturn:

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from acquisition.plan.plan import Plan, Step
 from acquisition.terminal.layout import note_lines, wrapped
+from acquisition.terminal.streams import HANDLER
 from instrument.text.terminal_safe import escape_control_characters
 
 
@@ -19,8 +20,9 @@ class EscapingConsole(Console):
     """Console that prints strings literally: no markup, control characters escaped."""
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Return the text with its control characters escaped."""
-        return super().render_str(escape_control_characters(text), **options)
+        """Return the text with its control characters escaped, in characters of the terminal."""
+        shown = escape_control_characters(text).encode(self.encoding, HANDLER)
+        return super().render_str(shown.decode(self.encoding), **options)
 
 
 _WIDE = 60  # characters that hold a bar beside the numbers of a scan

@@ -19,7 +19,7 @@ class TerminalOperator:
         more = "type the angle if it is another, " if request.action == "set axis" else ""
         try:
             answer = ask(f"\n{request.text}. Enter when done; {more}q to stop:")
-        except EOFError:
+        except (EOFError, OSError):  # its end, or the terminal is gone
             raise OperatorStop("standard input ended: nobody answers") from None
         if answer.lower() in _STOP:
             raise OperatorStop(f"stopped at the prompt: {request.text}")
@@ -36,7 +36,7 @@ def require_yes(question: str, no_terminal: str, declined: str) -> None:
         raise InputError(no_terminal)
     try:
         answer = ask(f"{question} [y/N]")
-    except EOFError:
+    except (EOFError, OSError):
         answer = ""
     if answer.lower() not in ("y", "yes"):
         raise OperatorStop(declined)

@@ -32,8 +32,13 @@ def gonio(*arguments: object) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-def gonio_here(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """Run the command without a terminal; the output of its child processes is captured too."""
+def gonio_here(
+    *arguments: object, cwd: Path | None = None, encoding: str = "utf-8"
+) -> subprocess.CompletedProcess[str]:
+    """Run the command without a terminal; the output of its child processes is captured too.
+
+    `encoding` of its standard streams, as a terminal's.
+    """
     with contextlib.ExitStack() as stack:
         stack.enter_context(contextlib.chdir(cwd or Path.cwd()))
         nobody = stack.enter_context(Path(os.devnull).open())
@@ -41,15 +46,16 @@ def gonio_here(*arguments: object, cwd: Path | None = None) -> subprocess.Comple
         stack.enter_context(_standing_for(0, nobody))
         stack.enter_context(_standing_for(1, out))
         stack.enter_context(_standing_for(2, err))
-        stdout, stderr = stack.enter_context(_text(1)), stack.enter_context(_text(2))
+        stdout, stderr = (stack.enter_context(_text(n, encoding)) for n in (1, 2))
         stack.enter_context(patch.multiple(sys, stdin=nobody, stdout=stdout, stderr=stderr))
         stack.enter_context(patch.object(sys, "argv", ["gonio", *map(str, arguments)]))
         stack.enter_context(patch.dict(os.environ))
-        stack.enter_context(_own_signals())
+        stack.enter_context(own_signals())
         code = _exit_code()
         stdout.flush()
         stderr.flush()
-        return subprocess.CompletedProcess(arguments, code, _read(out), _read(err))
+        texts = (_read(file, encoding) for file in (out, err))
+        return subprocess.CompletedProcess(arguments, code, *texts)
 
 
 def _exit_code() -> int:
@@ -73,15 +79,16 @@ def _standing_for(number: int, file: IO[str] | IO[bytes]) -> Iterator[None]:
         os.close(kept)
 
 
-def _text(number: int) -> TextIOWrapper:
+def _text(number: int, encoding: str) -> TextIOWrapper:
     """Line-buffered text stream on the descriptor, like Python's own."""
-    return open(number, "w", buffering=1, encoding="utf-8", closefd=False)
+    return open(number, "w", buffering=1, encoding=encoding, closefd=False)
 
 
 @contextlib.contextmanager
-def _own_signals() -> Iterator[None]:
-    """Restore the handlers of SIGINT and SIGTERM, which the command replaces."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+def own_signals() -> Iterator[None]:
+    """Restore the handlers of the signals that the command replaces."""
+    stops = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+    before = {number: signal.getsignal(number) for number in stops}
     try:
         yield
     finally:
@@ -89,6 +96,6 @@ def _own_signals() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _read(file: IO[bytes]) -> str:
+def _read(file: IO[bytes], encoding: str) -> str:
     file.seek(0)
-    return file.read().decode()
+    return file.read().decode(encoding)
