@@ -209,13 +209,13 @@ class Engine:
         rig, theta_i_deg = self._rig, exposed.step.pose.theta_i
         placement = Placement(rig.u_placement_mm, theta_i_deg, rig.lamp_distance_mm)
         signal = measure(exposed.frames, exposed.dark, window, rig.camera, placement, least)
-        return _reading(exposed, window, signal)
+        return _reading(exposed, signal)
 
     def _add_event(self, kind: str, text: str) -> None:
         self._record.add_event(self._devices.clock.utc().isoformat(), kind, text)
 
 
-def _reading(exposed: Exposed, window: Window, signal: Signal) -> Reading:
+def _reading(exposed: Exposed, signal: Signal) -> Reading:
     """Return the row of the record."""
     step, first = exposed.step, exposed.frames[0]
     return Reading(
@@ -229,7 +229,6 @@ def _reading(exposed: Exposed, window: Window, signal: Signal) -> Reading:
         block=step.block,
         exposure_s=first.exposure_s,
         frames=len(exposed.frames),
-        window_pixels=window.pixels,
         time_s=exposed.time_s,
         free_s=exposed.free_s,
         time_utc=exposed.time_utc,

@@ -10,6 +10,7 @@ import numpy as np
 
 from acquisition.engine.exposure_check import ExposureCheck
 from acquisition.engine.retrying_camera import RetryingCamera
+from acquisition.measure.hot_pixels import hot_pixel_text
 from acquisition.measure.linearity import require_possible_times
 from acquisition.measure.radiometry import SATURATION_FRACTION, Dark, average_dark, bright_level
 from acquisition.measure.window import Window
@@ -20,7 +21,7 @@ from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
 from instrument.devices import Frame, Lamp, Surface
 from instrument.errors import DeviceError
-from instrument.record.event_kinds import OPERATOR
+from instrument.record.event_kinds import HOT, OPERATOR
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 
@@ -180,6 +181,8 @@ class Exposer:
             mean, noise = float(dark.mean.mean()), float(np.sqrt(dark.variance.mean()))
             time_utc = self.clock.utc().isoformat()
             self.record.add_dark(time_utc, dark.exposure_s, dark.frames, mean, noise)
+            if dark.hot is not None:
+                self.record.add_event(time_utc, HOT, hot_pixel_text(dark.exposure_s, dark.hot))
         self.lamp.light()
         self._note_cover("lamp uncovered")
 

@@ -125,7 +125,7 @@ def dark_at(
         above = known.mean - camera.black_level_dn
         mean = camera.black_level_dn + above * (exposure_s / known.exposure_s)
         u = abs(float(above.mean())) / 2
-    return Dark(exposure_s, mean, known.variance, known.frames), u
+    return Dark(exposure_s, mean, known.variance, known.frames, known.hot), u
 
 
 def require_possible_times(frames: Sequence[Frame]) -> None:

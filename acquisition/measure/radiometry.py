@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,23 +10,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.measure.hot_pixels import find_hot_pixels, without_hot_pixels
 from acquisition.measure.placement import Placement, placement_u_dn
 from acquisition.measure.window import Window
 from instrument.config.camera import CameraConfig
 from instrument.devices import Frame, Image
-from instrument.geometry import FloatArray
+from instrument.geometry import BoolArray, FloatArray
 
 SATURATION_FRACTION = 0.97  # of full scale: above it the response is not trusted
+# Shares of the window's weight, above which a reading is flagged; less is part of its uncertainty.
+SATURATED_SHARE, HOT_SHARE = 0.001, 0.01
 
 
 @dataclass(frozen=True, slots=True)
 class Dark:
-    """Dark of one exposure: `mean` (rows, columns) in DN, `variance` in DN^2, over `frames`."""
+    """Dark of one exposure: `mean` (rows, columns) in DN, `variance` in DN^2, over `frames`.
+
+    `hot` (rows, columns): True for a hot pixel, which does not count; None for none.
+    """
 
     exposure_s: float
     mean: FloatArray
     variance: FloatArray
     frames: int
+    hot: BoolArray | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +41,8 @@ class Signal:
     """Mean of a window in counts (DN); the u are standard uncertainties of `signal_dn`.
 
     `u_placement_dn` is the first-order effect of a misplaced sample, with the sign of the change
-    for a sample too close to the camera; `u_texture_dn` is the second-order effect.
+    for a sample too close to the camera; `u_texture_dn` is the second-order effect, with the effect
+    of hot pixels left out and of single saturated ones. `window_pixels`: area that counts.
     """
 
     signal_dn: float
@@ -42,6 +51,7 @@ class Signal:
     u_dark_dn: float
     u_placement_dn: float
     u_texture_dn: float
+    window_pixels: float
     saturated_pixels: int
     peak_dn: float
     flags: str
@@ -50,7 +60,8 @@ class Signal:
 def average_dark(frames: Sequence[Frame], camera: CameraConfig) -> Dark:
     """Return the dark of a series of frames taken without light."""
     mean, variance = _mean_and_variance([frame.image for frame in frames], camera)
-    return Dark(frames[0].exposure_s, mean, variance, len(frames))
+    hot = find_hot_pixels(mean, camera)
+    return Dark(frames[0].exposure_s, mean, variance, len(frames), hot if hot.any() else None)
 
 
 def bright_level(counts: NDArray[Any]) -> float:
@@ -68,13 +79,18 @@ def measure(
     min_pixels: int,
 ) -> Signal:
     """Return the window's mean over all frames minus the dark, with uncertainty and flags."""
+    window, hot_share = without_hot_pixels(window, dark.hot)
     crops = [frame.image[window.crop] for frame in frames]
     counted = [crop[window.counted] for crop in crops]
     mean, variance = _mean_and_variance(crops, camera)
-    saturated = sum(int(np.count_nonzero(counts >= camera.max_dn)) for counts in counted)
+    saturated = [(crop >= camera.max_dn) & window.counted for crop in crops]
+    saturated_weight = float(np.mean([window.weights[pixels].sum() for pixels in saturated]))
     peak = bright_level(counted[0]) if counted[0].size else float("nan")
     u_dark_noise = _u_noise(window, dark.variance[window.crop] / dark.frames)
     u_placement, u_texture = placement_u_dn(frames, dark.mean, window, placement)
+    u_hot = hot_share * _spread(mean - dark.mean[window.crop], window)
+    # A saturated pixel is short of its true count by up to full scale, or more.
+    u_saturated = saturated_weight * (camera.max_dn - camera.black_level_dn)
     return Signal(
         signal_dn=window.mean(mean - dark.mean[window.crop]),
         u_noise_dn=_u_noise(window, variance / len(frames)),
@@ -83,11 +99,17 @@ def measure(
             np.hypot(u_dark_noise, _u_rounding(window.mean(dark.mean[window.crop]), camera))
         ),
         u_placement_dn=u_placement,
-        u_texture_dn=u_texture,
-        saturated_pixels=saturated,
+        u_texture_dn=math.hypot(u_texture, u_hot, u_saturated),
+        window_pixels=window.pixels,
+        saturated_pixels=sum(int(np.count_nonzero(pixels)) for pixels in saturated),
         peak_dn=peak,
-        flags=_flags(window, min_pixels, saturated, peak, camera),
+        flags=_flags(window, min_pixels, (saturated_weight, hot_share), peak, camera),
     )
+
+
+def _spread(signal: FloatArray, window: Window) -> float:
+    """Return the standard deviation over the window's pixels of a signal crop in DN."""
+    return float(np.std(signal[window.counted])) if window.counted.any() else 0.0
 
 
 def _mean_and_variance(
@@ -144,12 +166,21 @@ def rounding_u_dn(noise_variance_dn2: float) -> float:
 
 
 def _flags(
-    window: Window, min_pixels: int, saturated: int, peak_dn: float, camera: CameraConfig
+    window: Window,
+    min_pixels: int,
+    shares: tuple[float, float],
+    peak_dn: float,
+    camera: CameraConfig,
 ) -> str:
-    """Return the reading's flags separated by semicolons; empty if there are none."""
+    """Return the reading's flags separated by semicolons; empty if there are none.
+
+    `shares` of the window's weight: saturated pixels, hot pixels that were left out.
+    """
+    saturated, hot = shares
     flags = {
         "window leaves frame": not window.inside_frame,
         "too few pixels": window.pixels < min_pixels,
-        "saturated": saturated > 0 or peak_dn >= SATURATION_FRACTION * camera.max_dn,
+        "saturated": saturated > SATURATED_SHARE or peak_dn >= SATURATION_FRACTION * camera.max_dn,
+        "hot pixels": hot > HOT_SHARE,
     }
     return "; ".join(name for name, raised in flags.items() if raised)

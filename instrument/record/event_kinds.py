@@ -10,6 +10,7 @@ DRIFT: Final = "drift"  # a drift check at a resume, and its outcome
 RETRY: Final = "retry"  # a warning of a driver: an exchange was repeated, a frame discarded
 TROUBLE: Final = "trouble"  # an error of a driver that did not end the scan
 EXPOSURE: Final = "exposure"  # counts at two exposures, compared
+HOT: Final = "hot pixels"  # left out of the window's mean, with their positions
 STOPPED: Final = "stopped"  # the operator ended the scan
 FAULT: Final = "fault"  # a device or the disk ended the scan
 RESUMED: Final = "resumed"  # the scan continued
