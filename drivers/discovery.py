@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import termios
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -36,7 +37,7 @@ def identify_controller(port: str) -> str:
     """Send each kind's query to a port and quote the first answer."""
     try:
         return next(_answers(port), "no answer")
-    except DeviceError as error:
+    except (DeviceError, OSError, termios.error) as error:  # the list goes on
         return str(error)
 
 
@@ -54,6 +55,6 @@ def _answers(port: str) -> Iterator[str]:
 
 def cameras() -> list[str]:
     """Return a block of text per camera: formats, sizes, and controls with their ranges."""
-    from drivers.v4l2.listing import describe, video_devices
+    from drivers.v4l2.listing import descriptions, video_devices
 
-    return [describe(device) for device in video_devices()]
+    return descriptions(video_devices())

@@ -17,7 +17,14 @@ from numpy.typing import NDArray
 
 from drivers.v4l2 import ioctl
 from drivers.v4l2.controls import EXPOSURE, GAIN, Controls
-from drivers.v4l2.open_device import CHECK_USB, buffer_count, camera_lost, open_control, open_video
+from drivers.v4l2.open_device import (
+    CHECK_USB,
+    buffer_count,
+    camera_lost,
+    open_control,
+    open_video,
+    require_pictures,
+)
 from drivers.v4l2.settings import STEPS_PER_S, V4l2Settings
 from drivers.v4l2.worker_thread import Heartbeat
 from instrument.clock import Clock
@@ -70,6 +77,7 @@ class Capture:
         try:
             self.capability = ioctl.capability(self._control)
             self._who = f"camera {self.capability.card} ({settings.device})"
+            require_pictures(self.capability, settings.device, self._who)
             self._video, self._stream = open_video(settings, self._control, self._who)
             self.can_query_buffers = self._stream is not None
         except BaseException:

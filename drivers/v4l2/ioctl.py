@@ -64,6 +64,14 @@ DEFAULT_RANGE, FULL_RANGE, LIMITED_RANGE = 0, 1, 2
 BUFFER_QUEUED, BUFFER_DONE, BUFFER_ERROR = 0x2, 0x4, 0x40
 DISCRETE = 1  # V4L2_FRMSIZE_TYPE_DISCRETE
 
+VIDEO_CAPTURE, MULTI_PLANAR, METADATA = 0x1, 0x1000, 0x0080_0000
+STATES_NODE = 0x8000_0000  # V4L2_CAP_DEVICE_CAPS: the last field is of the opened node alone
+_PURPOSES = {
+    VIDEO_CAPTURE: "for pictures",
+    MULTI_PLANAR: "for pictures in several planes, which this program cannot use",
+    METADATA: "for metadata, not for pictures",
+}
+
 AUTO_WHITE_BALANCE = 0x98090C
 GAMMA = 0x980910
 AUTOGAIN = 0x980912
@@ -82,18 +90,29 @@ KINDS = {
     8: "bitmask",
     9: "menu",
 }
+_BIG_ENDIAN, _BIG_ENDIAN_TEXT, _HEX_LETTERS = 1 << 31, "-BE", len("0x12345678")
 _NEXT, _DISABLED, _WITHOUT_VALUE = 0x80000000, 0x1, (4, 5, 6, 7)
 _MAX_ENTRIES = 256  # a driver that never refuses an index must not cause an endless loop
 
 
 def fourcc(name: str) -> int:
-    """Return the number of a pixel format's name, padded to four letters ("Y16", "GREY")."""
-    return int.from_bytes(name.ljust(4).encode("ascii"), "little")
+    """Return the number of a pixel format's name ("Y16", "GREY", "Y16 -BE", "0x12345678")."""
+    if name.startswith("0x") and len(name) == _HEX_LETTERS:
+        return int(name, 16)
+    number = int.from_bytes(name[:4].ljust(4).encode("ascii"), "little")
+    return number | (_BIG_ENDIAN if name[4:] == _BIG_ENDIAN_TEXT else 0)
 
 
 def fourcc_name(number: int) -> str:
-    """Return the name of a pixel format's number, without padding."""
-    return number.to_bytes(4, "little").decode("ascii", "replace").rstrip()
+    """Return the name of a pixel format's number, without padding.
+
+    A big-endian format has bit 31 set, and "-BE" in its name as in v4l2-ctl; a number that is not
+    four letters is given in hexadecimal.
+    """
+    letters = (number & ~_BIG_ENDIAN).to_bytes(4, "little").decode("latin-1")
+    if not (letters.isascii() and letters.isprintable()):
+        return f"0x{number:08x}"
+    return letters + _BIG_ENDIAN_TEXT if number & _BIG_ENDIAN else letters.rstrip()
 
 
 def text(raw: bytes) -> str:
@@ -103,11 +122,25 @@ def text(raw: bytes) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Capability:
-    """Driver, card and bus as reported by a device."""
+    """Driver, card and bus as reported by a device, and the V4L2_CAP_ bits of the opened node."""
 
     driver: str
     card: str
     bus: str
+    node: int
+
+    @property
+    def captures(self) -> bool:
+        """True if this node delivers pictures in one plane, as the driver here needs them."""
+        return bool(self.node & VIDEO_CAPTURE)
+
+    @property
+    def purpose(self) -> str:
+        """Purpose of this node in words."""
+        for bit, purpose in _PURPOSES.items():
+            if self.node & bit:
+                return purpose
+        return "of another purpose than pictures"
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,8 +200,9 @@ def _call(descriptor: int, request: int, argument: bytes) -> bytes:
 def capability(descriptor: int) -> Capability:
     """Return driver, card and bus of the device behind a descriptor."""
     answer = _call(descriptor, QUERYCAP, bytes(CAPABILITY_STRUCT.size))
-    driver, card, bus, *_ = CAPABILITY_STRUCT.unpack(answer)
-    return Capability(text(driver), text(card), text(bus))
+    driver, card, bus, _, whole_device, node = CAPABILITY_STRUCT.unpack(answer)
+    own = node if whole_device & STATES_NODE else whole_device
+    return Capability(text(driver), text(card), text(bus), own)
 
 
 def current_format(descriptor: int) -> Format:
@@ -253,7 +287,9 @@ def controls(descriptor: int) -> list[Control]:
             answer = _call(descriptor, QUERYCTRL, asked)
         except OSError:
             return found
-        number = QUERYCTRL_STRUCT.unpack(answer)[0]
+        before, number = number, QUERYCTRL_STRUCT.unpack(answer)[0]
+        if number <= before:
+            return found  # a driver that never refuses
         entry = control(descriptor, number)
         if entry is not None and entry.kind != "class":
             found.append(entry)

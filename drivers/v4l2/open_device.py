@@ -40,6 +40,15 @@ def open_control(settings: V4l2Settings) -> int:
         ) from error
 
 
+def require_pictures(found: ioctl.Capability, device: str, who: str) -> None:
+    """Raise if a node is not for pictures; a USB camera has a second node, for metadata."""
+    if found.captures:
+        return
+    first = device.removesuffix("-video-index1") + "-video-index0"
+    advice = first if device.endswith("-video-index1") else "one that `gonio devices` lists"
+    raise DeviceError(f"{who}: this node is {found.purpose}; name {advice} in the rig file")
+
+
 def open_video(settings: V4l2Settings, control: int, who: str) -> tuple[VideoCapture, int | None]:
     """Return OpenCV's capture, set and checked, and the descriptor that it streams on, if found."""
     # In whole seconds, and read once: the shortest wait for a dead stream.

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.waits
 @pytest.mark.parametrize(
     ("controller", "answer"),
     [
-        (NewportController, r"'1VE SMC100.*' when asked as Newport SMC100"),
+        (NewportController, r"'1VE SMC_CC - .*' when asked as Newport SMC100"),
         (ZaberController, r"'@01 0 OK IDLE .*' when asked as Zaber"),
     ],
 )

@@ -53,7 +53,8 @@ class Capabilities:
     exposure to the frame's time stamp. delay_frames: number of frames after which a new exposure
     time takes effect. reports_filled: False for a driver that shows filled buffers as empty until
     they are dequeued. quantization: range of YUYV, as the number in G_FMT; `defects.limited_range`
-    of "declared" overrides it. defects: exposures other than those set, limited range.
+    of "declared" overrides it. big_endian: of all formats. node: purpose of the opened node, a
+    V4L2_CAP_ bit; one for metadata has no formats. defects: exposures other than those set.
     """
 
     card: str = "Emulated camera"
@@ -67,6 +68,8 @@ class Capabilities:
     reports_filled: bool = True
     without_controls: frozenset[int] = frozenset()
     quantization: int = ioctl.FULL_RANGE
+    node: int = ioctl.VIDEO_CAPTURE
+    big_endian: bool = False
     defects: CameraDefects = field(default_factory=CameraDefects)
 
 

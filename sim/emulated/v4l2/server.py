@@ -16,8 +16,8 @@ from sim.emulated.v4l2.stream import Stream
 
 _REQUEST, _ERROR = Struct("<II"), Struct("<i")
 _MAX_BYTES = 1024
-_CAPTURE_AND_STREAMING = 0x04200001  # V4L2_CAP_VIDEO_CAPTURE, _EXT_PIX_FORMAT, _STREAMING
-_DEVICE_CAPS = 0x80000000
+_STREAMING = 0x04200000  # V4L2_CAP_EXT_PIX_FORMAT, _STREAMING
+_BIG_ENDIAN = 1 << 31  # of a pixel format
 _PROGRESSIVE, _SRGB = 1, 8  # V4L2_FIELD_NONE, V4L2_COLORSPACE_SRGB
 _EXTENDED = 0xFEEDCAFE  # V4L2_PIX_FMT_PRIV_MAGIC
 _TIME_PER_FRAME = 0x1000  # V4L2_CAP_TIMEPERFRAME
@@ -125,18 +125,29 @@ class _Descriptor:
             return _ERROR.pack(refusal.number) + argument
 
     def _capability(self, _: bytes) -> bytes:
-        card = self._camera.capabilities.card.encode()
-        capabilities = (_DEVICE_CAPS | _CAPTURE_AND_STREAMING, _CAPTURE_AND_STREAMING)
+        own = self._camera.capabilities
+        # As uvcvideo answers: the whole device has pictures and metadata, each node has one.
+        whole = ioctl.STATES_NODE | ioctl.VIDEO_CAPTURE | ioctl.METADATA | _STREAMING
         return ioctl.CAPABILITY_STRUCT.pack(
-            b"emulated", card, b"platform:emulated-0", 6 << 16, *capabilities
+            b"emulated",
+            own.card.encode(),
+            b"platform:emulated-0",
+            6 << 16,
+            whole,
+            own.node | _STREAMING,
         )
 
     def _list_format(self, argument: bytes) -> bytes:
         index, kind, *_ = ioctl.FMTDESC_STRUCT.unpack(argument)
         formats = self._camera.capabilities.formats
-        _require(kind == ioctl.CAPTURE and index < len(formats))
+        _require(kind == ioctl.CAPTURE and index < len(formats) and self._for_pictures)
         name = formats[index]
-        return ioctl.FMTDESC_STRUCT.pack(index, kind, 0, name.encode(), ioctl.fourcc(name))
+        number = ioctl.fourcc(name) | _BIG_ENDIAN * self._camera.capabilities.big_endian
+        return ioctl.FMTDESC_STRUCT.pack(index, kind, 0, name.encode(), number)
+
+    @property
+    def _for_pictures(self) -> bool:
+        return self._camera.capabilities.node == ioctl.VIDEO_CAPTURE
 
     def _list_size(self, argument: bytes) -> bytes:
         index, number, *_ = ioctl.FRAMESIZE_STRUCT.unpack(argument)
@@ -145,7 +156,7 @@ class _Descriptor:
         return ioctl.FRAMESIZE_STRUCT.pack(index, number, ioctl.DISCRETE, *sizes[index], *[0] * 4)
 
     def _format(self, argument: bytes) -> bytes:
-        _require(argument[:4] == ioctl.CAPTURE.to_bytes(4, "little"))
+        _require(argument[:4] == ioctl.CAPTURE.to_bytes(4, "little") and self._for_pictures)
         return self._pack(self._camera.format())
 
     def _set_format(self, argument: bytes) -> bytes:
@@ -156,7 +167,7 @@ class _Descriptor:
 
     def _nearest_format(self, argument: bytes) -> ioctl.Format:
         kind, width, height, number, *_ = ioctl.FORMAT_STRUCT.unpack(argument)
-        _require(kind == ioctl.CAPTURE)
+        _require(kind == ioctl.CAPTURE and self._for_pictures)
         return self._camera.nearest_format(ioctl.fourcc_name(number), width, height)
 
     def _pack(self, chosen: ioctl.Format) -> bytes:

@@ -95,6 +95,9 @@ class Child:
     def describe(self, device: str) -> str:
         return listing.describe(device)
 
+    def descriptions(self, *devices: str) -> list[str]:
+        return listing.descriptions(devices)
+
     def serve_here(self, settings: V4l2Settings, socket: str) -> list[tuple[int, float]]:
         """Device model and OpenCV in one process: counts and exposures of a few frames."""
         from sim.emulated.v4l2.device import EmulatedCamera, Exposure
