@@ -9,7 +9,7 @@ from acquisition.engine.event_log import EventLogHandler, log_to_record
 from acquisition.engine.resume import Progress
 from acquisition.plan.plan import Plan, Step
 from acquisition.rig import open_devices
-from acquisition.terminal.console import console, duration_text, progress_bar
+from acquisition.terminal.console import console, duration_text, progress_bar, warnings_shown
 from instrument.clock import Clock, SystemClock
 from instrument.config.load import Loaded
 from instrument.errors import DeviceError, OperatorStop, StorageError
@@ -23,7 +23,7 @@ def scan(loaded: Loaded, plan: Plan, record: Record, progress: Progress | None =
     Raises `OperatorStop`, `DeviceError` or `StorageError` with the command that resumes the scan.
     """
     clock: Clock = SystemClock()
-    with log_to_record(record) as log:
+    with log_to_record(record) as log, warnings_shown("instrument.record"):
         try:
             with closing(open_devices(loaded)) as devices:
                 clock = devices.clock

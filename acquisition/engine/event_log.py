@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from instrument.record.event_kinds import RETRY, TROUBLE
 from instrument.record.record import Record
 
-LOGGERS = ("drivers", "acquisition", "sim")
+LOGGERS = ("drivers", "acquisition", "sim", "instrument.record")
 
 
 class EventLogHandler(logging.Handler):

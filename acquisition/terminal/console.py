@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -53,6 +54,25 @@ def ask(question: str) -> str:
     """Print a question and return the stripped answer; raise `EOFError` at the end of input."""
     console.print(question, end=" ", highlight=False, soft_wrap=True)
     return console.input("").strip()
+
+
+class _Shown(logging.Handler):
+    """Prints each message at once."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print a message, from any thread."""
+        console.print(record.getMessage(), highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def warnings_shown(logger: str) -> Iterator[None]:
+    """Print what is logged under this name, within a `with` block: a person has to act on it."""
+    handler = _Shown(logging.WARNING)
+    logging.getLogger(logger).addHandler(handler)
+    try:
+        yield
+    finally:
+        logging.getLogger(logger).removeHandler(handler)
 
 
 def duration_text(seconds: float) -> str:

@@ -25,6 +25,7 @@ from instrument.record.network_share import network_share
 from instrument.record.reading import Check, Preview, Reading
 from instrument.record.schema import LEAST_SQLITE, MARKS, TABLES, begin, connect
 from instrument.record.validation import check_files, check_schema, check_values
+from instrument.record.write_lock import begin_writing, held_by_another, is_busy
 from instrument.text.atomic_file import disk_full, explain_os_error, make_folder, sync_folder
 
 FILE_NAME = "record.sqlite"
@@ -223,15 +224,16 @@ class Record(Closeable):
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
-        """One transaction; `StorageError` if the disk does not accept it."""
+        """One transaction; `StorageError` if the disk does not accept it, or it is not free."""
         self._require_same_file()
+        path = self.folder / FILE_NAME
         try:
             with self._db:
+                begin_writing(self._db, path)
                 yield self._db
         except sqlite3.IntegrityError:
             raise  # an error of the program, not of the disk
         except sqlite3.Error as error:
-            path = self.folder / FILE_NAME
             raise StorageError(f"{path}: {_explain(error, self.folder)}") from error
 
     def _require_same_file(self) -> None:
@@ -247,6 +249,8 @@ class Record(Closeable):
 
 def _refusal(error: Exception, path: Path) -> GonioError:
     """Return the error for a file that cannot be opened as a record."""
+    if isinstance(error, sqlite3.Error) and is_busy(error):
+        return StorageError(held_by_another(path))
     if isinstance(error, sqlite3.Error) and _name_of(error).startswith(_NOT_PERMITTED):
         return StorageError(f"{path}: {_explain(error, path.parent)}")
     return InputError(f"{path}: not a record of this program: {error}")

@@ -15,10 +15,12 @@ from typing import NamedTuple, get_args
 
 from instrument.devices import Surface
 from instrument.record.reading import Kind
+from instrument.record.write_lock import TRY_S
 
 SCHEMA_VERSION = 4
 MOST_BYTES = 128 * 1024**2  # of one text or picture; the largest camera's picture needs half of it
 LEAST_SQLITE = (3, 37, 0)  # the first with STRICT tables
+_OPENING_S = 2.0  # of waiting for a lock; nothing moves yet
 _LARGEST = 1e30  # of any number that has no limit of its own
 _LARGEST_WHOLE = 2**53  # larger whole numbers are not exact as floats
 
@@ -164,11 +166,12 @@ def harden_connection(database: sqlite3.Connection) -> None:
 
 def connect(path: Path) -> sqlite3.Connection:
     """Open a file as a record: hardened, with a write-ahead log, each commit flushed to disk."""
-    database = sqlite3.connect(path)
+    database = sqlite3.connect(path, timeout=_OPENING_S)
     try:
         harden_connection(database)
         database.execute("PRAGMA journal_mode=WAL")
         database.execute("PRAGMA synchronous=FULL")
+        database.execute(f"PRAGMA busy_timeout={1e3 * TRY_S:.0f}")
     except sqlite3.Error:
         database.close()
         raise

@@ -1,13 +1,15 @@
-"""Full and read-only disks, a moved or removed folder, a clock set back: nothing is lost."""
+"""Full, read-only or locked files, a moved folder, a clock set back: nothing is lost."""
 
 from __future__ import annotations
 
 import csv
+import logging
 import os
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -21,11 +23,13 @@ from acquisition.plan.plan import make_plan
 from acquisition.rig import open_devices
 from instrument.clock import Clock
 from instrument.errors import StorageError
+from instrument.record import write_lock
 from instrument.record.reading import Reading
-from instrument.record.record import Record
+from instrument.record.record import FILE_NAME, Record
 from tests.support.command import gonio
 from tests.support.paths import CONFIGS, ROOT
 from tests.support.scans import small_scan, undated
+from tests.support.storage.holder import Holder, held
 
 LOADED = small_scan()
 PLAN = make_plan(LOADED)
@@ -117,6 +121,30 @@ def test_a_clock_that_is_set_back_changes_the_dates_and_nothing_else(
         dates = [r.time_utc for r in record.readings()]
         assert dates != sorted(dates)
         assert undated(record.readings()) == whole
+
+
+def test_a_record_that_another_program_holds_is_waited_for_and_named(
+    whole: list[Reading],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """The program lets go once the operator has been told."""
+    monkeypatch.setattr(write_lock, "NOTICE_S", 0.0)
+    file = tmp_path / "run" / FILE_NAME
+    with ExitStack() as opened:
+        holders: list[Holder] = []
+        at_step(monkeypatch, 4, lambda _: holders.append(opened.enter_context(held(file))))
+        released = logging.Handler(logging.WARNING)
+        monkeypatch.setattr(released, "emit", lambda _: holders[0].release())
+        monkeypatch.setattr(write_lock.log, "handlers", [released])
+        with Record.create(tmp_path / "run", {}) as record:
+            scan(LOADED, PLAN, record)
+            assert undated(record.readings()) == whole
+            retries = [text for _, kind, text in record.events() if kind == "retry"]
+    assert retries
+    assert f"process {holders[0].pid} (" in retries[0]
+    assert retries[0] in capfd.readouterr().err.replace("\n", "")
 
 
 # The whole command, on a disk with a quota.

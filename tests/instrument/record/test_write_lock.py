@@ -1,0 +1,104 @@
+"""A record that another program holds: the writer waits, says for whom, and gives up in time."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import sqlite3
+import threading
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from instrument.errors import StorageError
+from instrument.record import write_lock
+from instrument.record.record import FILE_NAME, Record
+from instrument.record.write_lock import NOTICE_S, PATIENCE_S, begin_writing
+from tests.support.storage.holder import held
+
+
+class On(logging.Handler):
+    """Calls a function at the first message, and keeps all of them."""
+
+    def __init__(self, action: Callable[[], None]) -> None:
+        super().__init__()
+        self.messages: list[str] = []
+        self._action = action
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.messages.append(record.getMessage())
+        self._action()
+
+
+def test_a_writer_waits_for_another_program_and_then_writes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(write_lock, "NOTICE_S", 0.0)
+    with Record.create(tmp_path / "run", {}) as record, held(record.folder / FILE_NAME) as holder:
+        handler = On(holder.release)
+        monkeypatch.setattr(write_lock.log, "handlers", [handler])
+        record.add_event("2026", "operator", "done")
+        assert list(record.events()) == [("2026", "operator", "done")]
+    (message,) = handler.messages
+    assert f"{FILE_NAME}: process {holder.pid} (" in message
+    assert "save or discard the changes there, or close it; waiting 60 s for it" in message
+
+
+class Waited:
+    """Clock that only `sleep` advances."""
+
+    def __init__(self) -> None:
+        self.time_s = 100.0
+
+    def now_s(self) -> float:
+        return self.time_s
+
+    def utc(self) -> datetime:
+        return datetime.now(UTC)
+
+    def sleep(self, seconds: float) -> None:
+        self.time_s += 10 * seconds
+
+
+def test_a_writer_gives_up_after_a_minute(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    clock = Waited()
+    with Record.create(tmp_path / "run", {}):
+        pass
+    file = tmp_path / "run" / FILE_NAME
+    database = sqlite3.connect(file, timeout=0)
+    with held(file) as holder, pytest.raises(StorageError) as failed:
+        begin_writing(database, file, clock)
+    database.close()
+    assert f"process {holder.pid} (" in str(failed.value)
+    assert "holds the record for 60 s: save or discard the changes there" in str(failed.value)
+    assert PATIENCE_S < clock.time_s - 100.0 < PATIENCE_S + 1.0
+    assert len(caplog.messages) == 1
+    assert NOTICE_S < PATIENCE_S / 10
+
+
+def test_a_wait_ends_at_once_with_a_signal(tmp_path: Path) -> None:
+    """SQLite's own wait would hold a Ctrl-C back; nothing is left half done."""
+    with Record.create(tmp_path / "run", {}) as record:
+        with held(record.folder / FILE_NAME):
+            main = threading.get_ident()
+            threading.Timer(0.2, signal.pthread_kill, (main, signal.SIGINT)).start()
+            begun_s = time.monotonic()
+            with pytest.raises(KeyboardInterrupt):
+                record.add_event("2026", "operator", "never")
+            assert time.monotonic() - begun_s < PATIENCE_S / 10
+        record.add_event("2026", "stopped", "by the operator")
+        assert [text for _, _, text in record.events()] == ["by the operator"]
+
+
+def test_a_record_held_from_reading_is_not_called_foreign(tmp_path: Path) -> None:
+    with Record.create(tmp_path / "run", {}):
+        pass
+    file = tmp_path / "run" / FILE_NAME
+    with (
+        held(file, "PRAGMA locking_mode=EXCLUSIVE") as holder,
+        pytest.raises(StorageError, match=f"process {holder.pid} .* holds the record: save"),
+    ):
+        Record.open(tmp_path / "run")
