@@ -57,7 +57,7 @@ def demonstration(
     shipped = shipped_demo()
     protocol, rig = shipped.protocol, binned(shipped.rig)
     steps = _view_steps(protocol)
-    steps = steps.model_copy(update={"num": views or steps.num})
+    steps = steps.model_copy(update={"num": views or steps.count, "step": None})
     window = protocol.window
     least = window.min_pixels // BINNING**2
     protocol = protocol.model_copy(

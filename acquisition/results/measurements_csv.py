@@ -31,12 +31,14 @@ def measurements_csv(reduced: Reduced, u_brdf: FloatArray, loaded: Loaded) -> st
     """Return the text of the table; u_brdf (N,) in 1/sr.
 
     After COLUMNS, which are documented, comes one column for each component of the uncertainty,
-    and then what a fit needs. A value that is not known is an empty cell.
+    then what a fit needs, then the protocol's metadata as far as given. A value that is not known
+    is an empty cell.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     parts = ((f"u_{n.replace(' ', '_')}_relative", _cells(u)) for n, u in reduced.parts.items())
-    further = dict((*parts, *_columns_for_fits(reduced, loaded)))
+    metadata = ((name, repeat(fact)) for name, fact in loaded.protocol.metadata.given().items())
+    further = dict((*parts, *_columns_for_fits(reduced, loaded), *metadata))
     writer.writerow([*COLUMNS, *further])
     values = (reduced.radiance, reduced.u_radiance, reduced.brdf, u_brdf)
     cells = [_cells(value) for value in values]

@@ -12,6 +12,7 @@ from analysis.fit.fit import FitResult
 from analysis.report.data import Candidate, Curve, ReportData
 from instrument.config.axes import AXES
 from instrument.config.load import Loaded
+from instrument.config.protocol import Metadata
 from instrument.config.rig import Rig
 from instrument.geometry import FloatArray, Geometry
 from instrument.record.record import Record
@@ -55,6 +56,7 @@ def report_data(
         previews=tuple(record.previews()),
         rig=_rig_rows(loaded.rig),
         devices=tuple(record.devices().items()),
+        metadata=_metadata_rows(protocol.metadata),
         versions=_version_rows(record),
         times=_time_rows(record),
     )
@@ -105,6 +107,13 @@ def _rig_rows(rig: Rig) -> Rows:
         ),
         *axes,
         ("sample on the axis", f"u {rig.u_placement_mm:g} mm (k = 1)"),
+    )
+
+
+def _metadata_rows(metadata: Metadata) -> Rows:
+    return tuple(
+        (name.replace("_nm", " (nm)").replace("_", " "), fact)
+        for name, fact in metadata.given().items()
     )
 
 

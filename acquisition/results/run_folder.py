@@ -31,7 +31,7 @@ def default_folder(loaded: Loaded) -> Path:
 
 
 def run_meta(loaded: Loaded, plan: Plan) -> dict[str, str]:
-    """Return what the record keeps about a new run: inputs, versions, start and planned length."""
+    """Return what the record keeps of a new run: inputs, metadata, versions, start, length."""
     ran_on = {"python": platform.python_version(), "system": platform.platform()}
     return {
         "protocol_file": str(loaded.protocol_path),
@@ -46,6 +46,7 @@ def run_meta(loaded: Loaded, plan: Plan) -> dict[str, str]:
         "planned_s": f"{plan.duration_s:.1f}",
         "hidden": str(len(plan.hidden)),
         "steps": str(len(plan.steps)),
+        **loaded.protocol.metadata.given(),
     }
 
 

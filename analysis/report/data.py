@@ -95,6 +95,7 @@ class ReportData:
     previews: tuple[Preview, ...] = ()
     rig: Rows = ()
     devices: Rows = ()
+    metadata: Rows = ()
     versions: Rows = ()
     times: Rows = ()
 

@@ -350,6 +350,7 @@ def _png_size(png: bytes) -> tuple[int, int] | None:
 
 def _facts(data: ReportData) -> str:
     tables = (
+        ("metadata", "Sample and light", data.metadata),
         ("rig", "Rig", data.rig),
         ("devices", "Devices", data.devices),
         ("times", "Times", data.times),

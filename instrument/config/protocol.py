@@ -6,6 +6,7 @@ values of a protocol with one another and with its rig.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
@@ -30,19 +31,56 @@ class Sample(Section):
     height_mm: SampleSize
 
 
+MOST_ANGLES = 100_000
+
+
 class Steps(Section):
-    """Evenly spaced angles: `num` values from `start` to `stop`, both included."""
+    """Evenly spaced angles from `start` to `stop`, both included.
+
+    `num`: how many. `step`: degrees from one to the next, positive also where `stop` is smaller.
+    One of the two is given.
+    """
 
     start: Degrees
     stop: Degrees
-    num: Annotated[int, Field(ge=1, le=100_000)]
+    num: Annotated[int, Field(ge=1, le=MOST_ANGLES)] | None = None
+    step: Annotated[float, Field(gt=0, le=720)] | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of angles; 0 where neither `num` nor `step` is given."""
+        if self.num is not None or self.step is None:
+            return self.num or 0
+        return round(self._intervals()) + 1
+
+    def _intervals(self) -> float:
+        return abs(self.stop - self.start) / (self.step or math.nan)
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """Require start == stop for num = 1, and start != stop for more."""
-        if self.num == 1 and self.start != self.stop:
+        """Require one of `num` and `step`, which lays angles on both ends."""
+        if self.num is None and self.step is None:
+            yield "num", f"is missing; allowed: a whole number from 1 to {MOST_ANGLES}, or `step`"
+        elif self.num is not None and self.step is not None:
+            yield "step", f"{self.step:g} beside num {self.num}; allowed: one of the two"
+        elif self.step is not None:
+            yield from self._wrong_step(self.step)
+        elif self.num == 1 and self.start != self.stop:
             yield "num", f"1; allowed: 2 or more from {self.start:g} to {self.stop:g}"
-        if self.num > 1 and self.start == self.stop:
+        elif self.num != 1 and self.start == self.stop:
             yield "num", f"{self.num}; allowed: 1, as start = stop = {self.start:g}"
+
+    def _wrong_step(self, step: float) -> Iterator[tuple[str, str]]:
+        count, span_deg = self.count, abs(self.stop - self.start)
+        if count > MOST_ANGLES:
+            yield "step", f"{step:g} gives {count} angles; allowed: at most {MOST_ANGLES}"
+        elif span_deg == 0 or abs(self._intervals() - (count - 1)) > 1e-6:
+            parts = max(count - 1, 1)
+            fitting = f", such as {span_deg / parts:.6g} or num: {parts + 1}" if span_deg else ""
+            yield (
+                "step",
+                f"{step:g} does not lead from {self.start:g} to {self.stop:g}; allowed: a part of "
+                f"their distance of {span_deg:g}{fitting}",
+            )
 
 
 FORMS_OF_ANGLES = ("<list>", "<steps>")  # no key has such a name
@@ -66,7 +104,7 @@ SweepConfig = Annotated[dict[SweepKey, Angles], Field(min_length=3)]
 def angles_deg(angles: list[float] | Steps) -> FloatArray:
     """Return the angles (N,) of one axis of a sweep in degrees, in the order of the file."""
     if isinstance(angles, Steps):
-        return np.linspace(angles.start, angles.stop, angles.num)
+        return np.linspace(angles.start, angles.stop, angles.count)
     return np.asarray(angles, dtype=np.float64)
 
 
@@ -147,6 +185,41 @@ class SimulatedSample(Section):
     mottling_size_mm: Annotated[float, Field(ge=0.2, le=1000)] = 2.0
 
 
+# Into a cell of a table: a spreadsheet takes a text that begins with = + - @ for a formula.
+Note = Annotated[
+    str,
+    Field(
+        min_length=1,
+        max_length=1000,
+        pattern=r"^[^=+\-@\s\x00-\x1f\x7f][^\x00-\x1f\x7f]*\n?$",
+        description="text of 1 to 1000 characters in one line, not beginning with = + - @",
+    ),
+]
+
+
+class Metadata(Section):
+    """Facts that an archive needs and no calculation uses; all may be left out.
+
+    They are copied into the record, the report and measurements.csv under these names.
+    """
+
+    sample_id: Note | None = None
+    operator: Note | None = None
+    wavelength_nm: Annotated[float, Field(ge=100, le=100_000)] | None = None
+    filter: Note | None = None
+    polarisation: Note | None = None
+    notes: Note | None = None
+
+    def given(self) -> dict[str, str]:
+        """Return the facts that are given, as texts by name."""
+        facts = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: _in_text(fact) for name, fact in facts.items() if fact is not None}
+
+
+def _in_text(fact: str | float) -> str:
+    return fact.strip() if isinstance(fact, str) else f"{fact:.10g}"
+
+
 class Protocol(Section):
     """Complete protocol file."""
 
@@ -163,3 +236,4 @@ class Protocol(Section):
     references: References = References()
     fit: FitConfig = FitConfig()
     simulated_sample: SimulatedSample | None = None
+    metadata: Metadata = Metadata()

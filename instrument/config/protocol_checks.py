@@ -156,7 +156,7 @@ def _repeated(protocol: MarkedYaml) -> Mistakes:
 
 
 def _count(angles: list[float] | Steps) -> int:
-    return angles.num if isinstance(angles, Steps) else len(angles)
+    return angles.count if isinstance(angles, Steps) else len(angles)
 
 
 def _twice(path: KeyPath, angles: list[float]) -> Mistakes:

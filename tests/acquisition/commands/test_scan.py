@@ -22,12 +22,15 @@ from tests.support.command import gonio_here as gonio
 from tests.support.scans import small_demo
 
 DEADLINE_S = 60.0
+METADATA = "{sample_id: F-17, operator: Jürgen, wavelength_nm: 550, notes: 'two, \"three\"'}"
 
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A protocol of two incidences and nine view angles."""
-    return small_demo(tmp_path_factory.mktemp("protocol"))
+    """A protocol of two incidences and nine view angles, with metadata."""
+    path = small_demo(tmp_path_factory.mktemp("protocol"))
+    path.write_text(f"{path.read_text()}metadata: {METADATA}\n")
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +75,19 @@ def test_a_run_leaves_the_documented_files(finished: Path) -> None:
     assert len(table) == 18 - 1  # (60, 60) is hidden by the lamp
     assert {float(row["theta_r_deg"]) for row in table} >= {-80.0, 0.0, 80.0}
     assert all(0 < float(row["u_brdf"]) < 0.1 * float(row["brdf"]) for row in table)
+
+
+def test_record_table_and_report_hold_the_metadata_of_the_protocol(finished: Path) -> None:
+    facts = {"sample_id": "F-17", "operator": "Jürgen", "wavelength_nm": "550"}
+    facts["notes"] = 'two, "three"'
+    with Record.open(finished) as record:
+        assert {name: record.meta(name) for name in facts} == facts
+        assert record.meta("filter") is None
+    assert all(row | facts == row for row in rows(finished))
+    assert "filter" not in rows(finished)[0]
+    report = (finished / "report.html").read_text()
+    for text in ("sample id", "wavelength (nm)", "Jürgen", "two, &quot;three&quot;"):
+        assert f">{text}<" in report
 
 
 def test_fit_json_has_the_documented_keys(finished: Path) -> None:

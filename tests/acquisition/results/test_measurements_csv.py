@@ -9,6 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from acquisition.engine.engine import Engine
 from acquisition.engine.resume import Progress
@@ -21,7 +24,7 @@ from analysis.data.acceptance import Acceptance
 from analysis.data.csv_table import read_table
 from analysis.data.measurements import Measurements
 from instrument.config.load import Loaded
-from instrument.config.protocol import References
+from instrument.config.protocol import Metadata, References
 from instrument.record.record import Record
 from tests.support.scans import changed, small_scan
 from tests.support.stopped_scan import scan
@@ -135,3 +138,24 @@ def plain(m: Measurements) -> dict[str, object]:
     lists = {n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in values.items()}
     errors = [(e.name, e.u_relative.tolist(), e.group.tolist()) for e in m.shared]
     return lists | {"shared": errors}
+
+
+NOTES = st.text(st.characters(exclude_categories=["Cs", "Cc"]), min_size=1, max_size=40)
+
+
+@settings(max_examples=30)
+@given(NOTES, NOTES)
+def test_metadata_follow_in_each_row_and_change_nothing_else(
+    reduced: Reduced, note: str, operator: str
+) -> None:
+    """A quote, a comma or a foreign script in them leaves the other columns as they are."""
+    try:
+        metadata = Metadata(notes=note, operator=operator, wavelength_nm=550.0)
+    except ValidationError:
+        return  # begins like a formula
+    loaded = changed(small_scan(), metadata=metadata)
+    found = measurements_csv(reduced, 0.01 * reduced.brdf, loaded)
+    rows = list(csv.DictReader(found.split("\n")))
+    facts = {"operator": operator.strip(), "wavelength_nm": "550", "notes": note.strip()}
+    without = list(csv.DictReader(text(reduced).split("\n")))
+    assert rows == [row | facts for row in without]

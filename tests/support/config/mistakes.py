@@ -5,7 +5,7 @@ Lines and columns are counted by hand in `texts.PROTOCOL` and `texts.RIG`.
 
 from tests.support.config.texts import PROTOCOL
 
-STEPS_OR_LIST = "a list of numbers from -360 to 360 or a block with start, stop, num"
+STEPS_OR_LIST = "a list of numbers from -360 to 360 or a block with start, stop, num, step"
 
 PROTOCOL_MISTAKES = {
     "number for text": (
@@ -120,7 +120,7 @@ PROTOCOL_MISTAKES = {
         "point: 4\ncolour: red",
         "10:1: colour: unknown key; allowed: name, description, rig, sample, sweeps, window,"
         " frames_per_point, dark_frames, exposure_target, keep_frames, references, fit,"
-        " simulated_sample",
+        " simulated_sample, metadata",
     ),
     "misspelt key that is required": (
         "u_reflectance: 0.005",
@@ -157,7 +157,7 @@ PROTOCOL_MISTAKES = {
         "dphi_deg: [0.0]",
         "dphi_deg: []",
         "6:15: sweeps[0].dphi_deg: a list of 0 is too short; allowed: "
-        "a list of numbers from -360 to 360 or a block with start, stop, num",
+        "a list of numbers from -360 to 360 or a block with start, stop, num, step",
     ),
     "num 0": (
         "num: 33",
@@ -172,13 +172,19 @@ PROTOCOL_MISTAKES = {
     "num missing": (
         ", num: 33",
         "",
-        "7:18: sweeps[0].theta_r_deg.num: is missing; allowed: a whole number from 1 to 100000",
+        "7:18: sweeps[0].theta_r_deg.num: is missing; allowed: a whole number from 1 to 100000, or"
+        " `step`",
     ),
-    "step for num": (
+    "step beside num": (
         "num: 33",
         "num: 33, step: 5",
-        "7:54: sweeps[0].theta_r_deg.step: unknown key; did you mean stop?"
-        " allowed: start, stop, num",
+        "7:60: sweeps[0].theta_r_deg.step: 5 beside num 33; allowed: one of the two",
+    ),
+    "step past the end": (
+        "num: 33",
+        "step: 7",
+        "7:51: sweeps[0].theta_r_deg.step: 7 does not lead from -80 to 80; allowed: a part of"
+        " their distance of 160, such as 6.95652 or num: 24",
     ),
     "axis missing": (
         "    dphi_deg: [0.0]\n",
