@@ -68,7 +68,7 @@ class Engine:
         self._ended = False
         note = partial(self._add_event, OPERATOR)
         self._positioner = Positioner(rig, devices.axes, devices.lamp, devices.operator, note)
-        camera = RetryingCamera(devices.camera)
+        camera = RetryingCamera(devices.camera, devices.clock, rig.camera.reconnect_s)
         self._exposer = Exposer(camera, devices.lamp, devices.clock, protocol, rig, record)
 
     def run(self, plan: Plan, progress: Progress | None = None) -> None:

@@ -65,7 +65,7 @@ class Exposer:
     _last: dict[Surface, Reading] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        self._check = ExposureCheck(self.rig.camera, self.clock, self.record)
+        self._check = ExposureCheck(self.rig.camera, self.clock, self._connected_s, self.record)
 
     def restore(self, readings: Sequence[Reading]) -> None:
         """Take over from a stopped scan: brightness of the surfaces, and exposures with a dark."""
@@ -80,7 +80,7 @@ class Exposer:
 
     def start_clock(self, elapsed_s: float) -> None:
         """Start the scan time, at the duration so far."""
-        self._start_s = self.clock.now_s() - elapsed_s
+        self._start_s = self._connected_s() - elapsed_s
 
     def expose(self, step: Step, window: Window) -> Exposed:
         """Take all frames of a step, unsaturated if the camera's exposure range allows it."""
@@ -95,8 +95,12 @@ class Exposer:
         return Exposed(step, frames, dark, time_s=time_s, free_s=self._scan_s(), time_utc=utc)
 
     def _scan_s(self) -> float:
-        """Return the scan time, without the frames of the exposure check."""
-        return self.clock.now_s() - self._start_s - self._check.spent_s
+        """Return the scan time, without waiting for a lost camera and checking exposures."""
+        return self._connected_s() - self._start_s - self._check.spent_s
+
+    def _connected_s(self) -> float:
+        """Return the time without that spent on waiting for a lost camera."""
+        return self.clock.now_s() - self.camera.waited_s
 
     def _search(self, step: Step, window: Window) -> list[Frame]:
         """Try exposures until the brightest part of the window is within the target.
@@ -153,11 +157,11 @@ class Exposer:
     def _dark(self, exposure_s: float) -> Dark:
         """Return the dark of an exposure; the scan time excludes darks repeated by a resume."""
         if exposure_s not in self._darks:
-            begun_s = self.clock.now_s()
+            begun_s = self._connected_s()
             asked_s = next((a for a, t in self._taken_s.items() if t == exposure_s), exposure_s)
             self.take_darks((asked_s,))
             if exposure_s in self._used_before:
-                self._start_s += self.clock.now_s() - begun_s
+                self._start_s += self._connected_s() - begun_s
         if exposure_s not in self._darks:
             raise DeviceError(
                 f"camera: {exposure_s:g} s cannot be set a second time: it now takes "

@@ -1,4 +1,4 @@
-"""Camera that retries when the connection is lost, a bounded number of times."""
+"""Camera that is waited for when its connection is lost, for a bounded time."""
 
 from __future__ import annotations
 
@@ -6,25 +6,28 @@ import logging
 from collections.abc import Callable
 from typing import TypeVar
 
+from instrument.clock import Clock
 from instrument.devices import Camera, Frame
 from instrument.errors import CameraLost
 
 log = logging.getLogger(__name__)
 
-MAX_TRIES = 4  # in each of them the camera's driver tries to reconnect for two seconds
+_FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.1, 1.0  # between attempts to reopen the camera
 
 T = TypeVar("T")
 
 
 class RetryingCamera:
-    """Repeats a call up to `MAX_TRIES` times; each retry is logged, and so enters the record.
+    """Repeats a call for up to `reconnect_s` after the camera was lost.
 
-    The driver restores the settings of a camera that reconnects, or raises another error. A call
-    is repeated as a whole: all its frames are from one connection.
+    The loss is logged once and so is the return; both enter the record. The driver restores the
+    settings of a camera that returns, or raises another error. A call is repeated as a whole: all
+    its frames are from one connection. `waited_s`: total time without a camera.
     """
 
-    def __init__(self, camera: Camera) -> None:
-        self._camera = camera
+    def __init__(self, camera: Camera, clock: Clock, reconnect_s: float) -> None:
+        self._camera, self._clock, self._reconnect_s = camera, clock, reconnect_s
+        self.waited_s = 0.0
 
     def set_exposure_s(self, exposure_s: float) -> float:
         """Set the exposure and return the one read back, in seconds."""
@@ -35,9 +38,23 @@ class RetryingCamera:
         return self._retry(lambda: self._camera.grab(count))
 
     def _retry(self, action: Callable[[], T]) -> T:
-        for tried in range(1, MAX_TRIES):
+        begun_s = self._clock.now_s()
+        try:
+            return action()
+        except CameraLost as error:
+            log.warning("%s: waiting for it for up to %g s", error, self._reconnect_s)
+            lost = error
+        pause_s = _FIRST_PAUSE_S
+        while (left_s := begun_s + self._reconnect_s - self._clock.now_s()) > 0:
+            self._clock.sleep(min(pause_s, left_s))
+            pause_s = min(2 * pause_s, _LONGEST_PAUSE_S)
+            away_s = self._clock.now_s() - begun_s
             try:
-                return action()
+                result = action()
             except CameraLost as error:
-                log.warning("%s: try %d of %d", error, tried + 1, MAX_TRIES)
-        return action()
+                lost = error
+                continue
+            self.waited_s += away_s
+            log.warning("camera: back after %.1f s, with its settings restored", away_s)
+            return result
+        raise CameraLost(f"{lost} (waited for {self._reconnect_s:g} s)") from lost

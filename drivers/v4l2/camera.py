@@ -2,7 +2,7 @@
 
 Use a device path of /dev/v4l/by-id: it names the same camera after it was unplugged. All calls run
 in one worker thread, so a hung driver blocks nobody. The next call reopens a camera that was lost
-and restores all its settings.
+and restores all its settings; if it is not there, the caller may try again.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _OPENING_S = 20.0  # no single request of an opening takes longer, not even on a
 _CONTROL_S = 6.0  # Linux gives a USB control five seconds
 _SILENT_S = 1.7  # beyond exposure and period; the worker itself reports a silent camera sooner
 _CLOSING_S = 2.0
-_REOPEN_S, _FIRST_PAUSE_S = 2.0, 0.1
+_RELEASE_S = 0.1  # a driver that takes longer to close the camera hangs
 
 Result = TypeVar("Result")
 
@@ -117,24 +117,13 @@ class V4l2Camera(Closeable):
         return self._call(lambda beat: session.take(beat, count, requested_s), silent_s)
 
     def _opened(self) -> Session:
-        """Return the session; try to reopen a lost camera, with growing pauses."""
+        """Return the session; reopen a camera that was lost, or raise `CameraLost` at once."""
         if self._closed:
             raise DeviceError(f"camera {self._settings.device}: is closed; open it again")
-        until_s = self._clock.now_s() + _REOPEN_S
-        pause_s = _FIRST_PAUSE_S
-        while self._session is None:
-            try:
-                self._open()
-            except CameraLost as error:
-                if self._clock.now_s() + pause_s > until_s:
-                    raise CameraLost(f"{error} (still so after {_REOPEN_S:g} s)") from error
-                log.warning("%s: trying again", error)
-                self._clock.sleep(pause_s)
-                pause_s *= 2
-        return self._session
+        return self._session or self._open()
 
-    def _open(self) -> None:
-        if self._released not in wait((self._released,), _FIRST_PAUSE_S).done:
+    def _open(self) -> Session:
+        if self._released not in wait((self._released,), _RELEASE_S).done:
             raise CameraLost(f"{self._who()}: its driver hangs; {CHECK_USB}")
         arguments = (self._settings, self._steps, self._traits, self._clock)
         session = self._call(lambda beat: Session(*arguments, beat), _OPENING_S)
@@ -146,6 +135,7 @@ class V4l2Camera(Closeable):
                 f"camera {self._settings.device}: {session.capability.card} answers where "
                 f"{known.card} did; plug that one in, and name a /dev/v4l/by-id path"
             )
+        return session
 
     def _call(self, action: Callable[[Heartbeat], Result], silent_s: float) -> Result:
         """Run in the worker thread; after a failure the next call reopens the camera."""

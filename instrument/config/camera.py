@@ -16,7 +16,10 @@ _BIT_DEPTHS = {"GREY": (8, 8), "YUYV": (8, 8), "Y10": (10, 10), "Y16": (9, 16)}
 
 
 class CameraConfig(Section):
-    """Camera on the beam: image, field of view, sensor and exposure."""
+    """Camera on the beam: image, field of view, sensor and exposure.
+
+    `reconnect_s`: time for which a scan waits for a camera whose connection was lost.
+    """
 
     width_px: Annotated[int, Field(ge=16, le=16384)]
     height_px: Annotated[int, Field(ge=16, le=16384)]
@@ -32,6 +35,7 @@ class CameraConfig(Section):
     min_exposure_s: Positive
     max_exposure_s: Positive
     frame_overhead_s: NotNegative
+    reconnect_s: Annotated[float, Field(ge=0, le=3600)] = 30.0
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
         """Check the order of exposures, the axis inside the image, and the black level."""

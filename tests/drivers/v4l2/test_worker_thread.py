@@ -41,7 +41,7 @@ def test_a_hung_driver_blocks_nobody(remote: RemoteCamera, scene: LevelScene) ->
         with pytest.raises(DeviceError, match=f"{WHO}: its driver has not answered for .*cable"):
             remote.grab(1)
         assert time.monotonic() - start_s < 0.001 + FOUND_WITHIN_S
-        with pytest.raises(DeviceError, match=rf"{WHO}: its driver hangs;.*still so after 2 s\)"):
+        with pytest.raises(DeviceError, match=f"{WHO}: its driver hangs;"):
             remote.grab(1)
         free.set()
         assert len(remote.grab(2)) == 2

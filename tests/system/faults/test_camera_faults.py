@@ -245,7 +245,7 @@ def test_a_camera_that_returns(
     repair: MakeFail,
     state: str,
 ) -> None:
-    """It is reopened at the first retry, with its settings; each retry is in the record."""
+    """It is reopened with its settings; the record has one event at the loss, one at the return."""
     failed: list[EmulatedCamera] = []
 
     def fail_until_retry(camera: EmulatedCamera) -> None:
@@ -256,16 +256,18 @@ def test_a_camera_that_returns(
         result = scan(short, remote, tmp_path / "run", (STATES[state], fail_until_retry))
     assert result.error is None
     assert result.readings == whole
-    assert any("try 2 of 4" in text for text in result.events["retry"])
+    lost, back = result.events["retry"]
+    assert lost.endswith("waiting for it for up to 30 s")
+    assert back.startswith("camera: back after")
 
 
 @contextmanager
 def repair_at_retry(failed: list[EmulatedCamera], repair: MakeFail) -> Iterator[None]:
-    """Repair the camera once the engine logs its first retry."""
+    """Repair the camera once the engine logs that it waits."""
 
     class RepairHandler(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
-            if failed and "try 2 of" in record.getMessage():
+            if failed and "waiting for it" in record.getMessage():
                 repair(failed.pop())
 
     log, handler = logging.getLogger("acquisition.engine.retrying_camera"), RepairHandler()
@@ -278,7 +280,7 @@ def repair_at_retry(failed: list[EmulatedCamera], repair: MakeFail) -> Iterator[
 
 LASTING: dict[str, tuple[MakeFail, str, str]] = {
     "bad frames": (all_frames_bad, "4 bad frames in a series", "moving"),
-    "unplugged": (EmulatedCamera.unplug, "still so after 2 s", "reading"),
+    "unplugged": (EmulatedCamera.unplug, "waited for 30 s", "reading"),
     "clamped": (clamp_exposure, "asked for, the camera took", "idle"),
 }
 
