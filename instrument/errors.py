@@ -31,6 +31,13 @@ class DeviceError(GonioError):
     exit_code = 3
 
 
+class ComputerPaused(DeviceError):
+    """Computer that ran nothing of this program while a stage moved, so that it was stopped.
+
+    No device is at fault: a stage that stands and has its reference may be moved on.
+    """
+
+
 class CameraLost(DeviceError):
     """Camera is gone or sends no frames; the next call to it searches for it and reopens it."""
 

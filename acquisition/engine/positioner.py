@@ -11,9 +11,11 @@ from acquisition.plan.pose import Pose, home_pose
 from instrument.config.axes import AXES
 from instrument.config.rig import Rig
 from instrument.devices import Lamp, Operator, Request, Surface
-from instrument.errors import DeviceError
+from instrument.errors import ComputerPaused, DeviceError
 
 log = logging.getLogger(__name__)
+
+PAUSES_A_SCAN = 3  # of the computer, after which a scan goes on, each in another move
 
 
 class Positioner:
@@ -37,6 +39,8 @@ class Positioner:
         self._moves: tuple[Move, ...] = ()
         self._target = self.pose
         self._started = False
+        self._moving = ""  # name of the axis that was told to move last and has not arrived
+        self._pauses, self._paused_move = 0, False
 
     def home(self) -> None:
         """Home every axis."""
@@ -65,20 +69,58 @@ class Positioner:
         self._moves, self._target = moves, target
         self._started = bool(moves) and not self._axes[moves[0].axis].by_hand
         if self._started:
-            self._axes[moves[0].axis].start_move(moves[0].angle_deg)
+            self._start(moves[0])
 
     def finish_moves(self) -> None:
         """Make the moves one after the other, then let the axes settle."""
         for number, move in enumerate(self._moves):
             axis = self._axes[move.axis]
             if number > 0 or not self._started:
-                axis.start_move(move.angle_deg)
-            axis.finish_move()
+                self._start(move)
+            self._finish(move)
             if axis.by_hand:
                 self._note(f"{move.axis} set to {axis.position_deg():g} deg")
         for name in dict.fromkeys(move.axis for move in self._moves):
             self._axes[name].settle()
         self.pose, self._moves = self._target, ()
+
+    def _start(self, move: Move) -> None:
+        axis = self._axes[move.axis]
+        self._moving, self._paused_move = move.axis, False
+        self._despite_pause(axis, lambda: axis.start_move(move.angle_deg))
+
+    def _finish(self, move: Move) -> None:
+        axis = self._axes[move.axis]
+
+        def whole_move() -> None:
+            axis.start_move(move.angle_deg)
+            axis.finish_move()
+
+        self._despite_pause(axis, axis.finish_move, whole_move)
+        self._moving = ""
+
+    def _despite_pause(
+        self, axis: Axis, action: Callable[[], None], again: Callable[[], None] | None = None
+    ) -> None:
+        """Act; after a pause of the computer, within bounds, act `again`, or as before."""
+        try:
+            action()
+        except ComputerPaused as pause:
+            self._require_may_go_on(axis, pause)
+            self._despite_pause(axis, again or action)
+
+    def _require_may_go_on(self, axis: Axis, pause: ComputerPaused) -> None:
+        """Raise the pause again unless the axis stands, has its reference, and bounds allow it."""
+        self._pauses += 1
+        if self._paused_move or self._pauses > PAUSES_A_SCAN:
+            often = (
+                "again in this move" if self._paused_move else f"{self._pauses} times in this scan"
+            )
+            raise ComputerPaused(f"{pause}; {often}, which is too often to go on") from pause
+        self._paused_move = True
+        if not axis.homed():  # read at rest
+            raise ComputerPaused(f"{pause}; {axis.name} has lost its reference") from pause
+        log.warning("%s; goes on from %g deg, where it stands", pause, axis.position_deg())
 
     def require_in_place(self) -> None:
         """Raise `DeviceError` if a motor has left the pose: frames taken since are invalid."""
@@ -98,10 +140,12 @@ class Positioner:
     def make_safe(self) -> None:
         """Stop every axis and close the shutter, even if some of them fail.
 
-        An action interrupted by a Ctrl-C is repeated, and the interruption is logged.
+        What moves is stopped first: a stop may wait for a port that has vanished. An action
+        interrupted by a Ctrl-C is repeated, and the interruption is logged.
         """
+        names = sorted(AXES, key=lambda name: name != self._moving)
         actions: list[tuple[str, Callable[[], None]]] = [
-            (name, self._axes[name].stop) for name in AXES if name in self._axes
+            (name, self._axes[name].stop) for name in names if name in self._axes
         ]
         if self._rig.lamp.darkened_by == "shutter":
             actions.append(("lamp", self._lamp.darken))

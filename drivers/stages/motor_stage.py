@@ -14,7 +14,7 @@ from drivers.stages.watchdog import Watchdog
 from instrument.clock import Clock
 from instrument.closeable import Closeable
 from instrument.devices import REPLY_S
-from instrument.errors import DeviceError
+from instrument.errors import ComputerPaused, DeviceError
 
 log = logging.getLogger(__name__)
 
@@ -95,13 +95,14 @@ class MotorStage(ABC):
         ramp_s = self._limits.speed_deg_per_s / self._limits.acceleration_deg_per_s2
         until_s = self._clock.now_s() + ramp_s + STALLED_S
         while now.moving:
-            if self._clock.now_s() > until_s:
+            late = self._clock.now_s() > until_s  # read before a status that may come much later
+            now = self.status()
+            if now.moving and late:
                 raise DeviceError(
                     f"{self.name}: still moves {ramp_s + STALLED_S:.1f} s after it was stopped: "
                     "cut its power, then look at its controller"
                 )
             self._clock.sleep(POLL_S)
-            now = self.status()
         return now
 
     def _status_before_motion(self) -> Status:
@@ -160,16 +161,18 @@ class MotorStage(ABC):
     def _monitor_homing(self, again: bool) -> None:
         self._send_home()
         self._repeat_stop()
-        monitor = HomingMonitor(self._limits.homing_s, self._clock.now_s(), again)
+        time_s = self._clock.now_s()
+        monitor = HomingMonitor(self._limits.homing_s, time_s, again)
         while not monitor.ended(now := self._poll()):
-            if monitor.should_resend(self._clock.now_s()):
+            if monitor.should_resend(time_s):
                 log.warning("%s: stands still: homing command sent again", self.name)
                 self._send_home()  # it stands and has no reference: the command never arrived
-            problem = monitor.problem(self._clock.now_s())
+            problem = monitor.problem(time_s)
             if problem:
                 self.stop()
                 raise DeviceError(f"{self.name}: {problem}, at {now.position_deg:g} deg")
             self._clock.sleep(POLL_S)
+            time_s = self._clock.now_s()  # before the status: it is then judged by no later time
 
     def start_move(self, angle_deg: float) -> None:
         """Start a move to an angle in degrees.
@@ -208,9 +211,9 @@ class MotorStage(ABC):
 
     def _monitor_move(self, target_deg: float) -> float:
         monitor = MoveMonitor(self._limits, self._from_deg, target_deg, self._started_s)
+        time_s = self._clock.now_s()
         while not monitor.ended(now := self._poll()):
             self._refuse_lost_reference(now)
-            time_s = self._clock.now_s()
             if monitor.should_resend(time_s):
                 log.warning("%s: stands still: move to %g deg sent again", self.name, target_deg)
                 self._send_move(target_deg)  # it has not moved: the command never arrived
@@ -221,6 +224,7 @@ class MotorStage(ABC):
                 self.stop()
                 raise DeviceError(f"{self.name}: {problem}")
             self._clock.sleep(POLL_S)
+            time_s = self._clock.now_s()  # before the status: it is then judged by no later time
         return self._check_arrival(now)
 
     def close(self) -> None:
@@ -243,19 +247,34 @@ class MotorStage(ABC):
             if self.watchdog.fired:
                 raise type(error)(f"{error}; {self._no_status}") from error
             raise
-        if self.watchdog.fired:
-            self._target_deg = None
-            raise DeviceError(f"{self.name}: {self._no_status}: look at its cable, then home it")
+        self._raise_if_unwatched()
         if self._stopped:
             self._target_deg = None
             raise Stopped(f"{self.name}: stopped at {now.position_deg:g} deg")
         self._refuse_fault(now)
         return now
 
+    def _raise_if_unwatched(self) -> None:
+        """Raise, once the watchdog has stopped the stage, what was to blame: computer or line."""
+        if not self.watchdog.fired:
+            return
+        self._target_deg = None
+        if self.watchdog.paused_s:
+            raise ComputerPaused(
+                f"{self.name}: {self._no_status}: look at what else runs on this computer, and at "
+                "its power saving"
+            )
+        raise DeviceError(f"{self.name}: {self._no_status}: look at its cable, then home it")
+
     @property
     def _no_status(self) -> str:
-        silent_s = self.watchdog.silent_s
-        return f"no status for {silent_s:g} s while it moved, so it was told to stop"
+        silent_s, paused_s = self.watchdog.silent_s, self.watchdog.paused_s
+        why = (
+            f"the computer paused for {paused_s:.1f} s"
+            if paused_s
+            else f"no status for {silent_s:g} s"
+        )
+        return f"{why} while it moved, so it was told to stop"
 
     def _probe(self) -> bool:
         """Ask for the status without retries; True if the controller answers."""
@@ -288,6 +307,7 @@ class MotorStage(ABC):
         """Repeat a stop that came while a command was being sent, and raise `Stopped`."""
         if self._stopped:
             self._send_stop()
+            self._raise_if_unwatched()
             raise Stopped(f"{self.name}: stopped as it was about to move")
 
     def _refuse_lost_reference(self, now: Status) -> None:

@@ -177,6 +177,7 @@ class OrientalStage(MotorStage):
 
     def _raise_if_stopped(self) -> None:
         if self._stopped:
+            self._raise_if_unwatched()
             raise Stopped(f"{self.name}: stopped before it began to move")
 
     def _output(self, until_s: float) -> framing.Output:

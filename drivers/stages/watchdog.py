@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import TypeVar
 
+from drivers.stages.pause_meter import PauseMeter
 from instrument.clock import Clock
 from instrument.devices import REPLY_S
 
@@ -31,7 +32,8 @@ class Watchdog:
 
     The program reads the status through `poll`. While nobody polls, the thread calls `probe`,
     which asks once, without retries, and returns True for an answer. After `silent_s` without an
-    answer to either, the thread calls `stop`. Neither `probe` nor `stop` may raise.
+    answer to either, the thread calls `stop`. Neither `probe` nor `stop` may raise. `paused_s` is
+    then the time for which the computer was paused, 0 if the line would have been too late anyway.
     """
 
     def __init__(
@@ -49,13 +51,15 @@ class Watchdog:
         self._over = threading.Event()
         self._over.set()
         self._answered_s = 0.0
-        self.fired = False
+        self._meter = PauseMeter(clock)
+        self.fired, self.paused_s = False, 0.0
 
     def begin(self) -> None:
         """Start to watch, just before a motion."""
         self.end()
-        self.fired, self._answered_s = False, self._clock.now_s()
+        self.fired, self.paused_s, self._answered_s = False, 0.0, self._clock.now_s()
         self._over = threading.Event()
+        self._meter.begin(self._over)
         threading.Thread(
             target=self._watch, args=(self._over,), name=f"watchdog {self._name}", daemon=True
         ).start()
@@ -75,6 +79,8 @@ class Watchdog:
         while not over.wait(_TICK_S):
             silent_s = self._clock.now_s() - self._answered_s
             if silent_s > self.silent_s:
+                paused_s = self._meter.paused_since_s(self._answered_s)
+                self.paused_s = paused_s if silent_s - paused_s <= self.silent_s else 0.0
                 self.fired = True
                 over.set()
                 self._stop()

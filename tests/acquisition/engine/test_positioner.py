@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from acquisition.engine.engine import Devices
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded
-from instrument.errors import DeviceError
+from instrument.errors import ComputerPaused, DeviceError
 from instrument.record.reading import Reading
 from instrument.record.record import Record
+from tests.support.scans import undated
 from tests.support.stand_ins import PassThrough, Spy
 from tests.support.stopped_scan import scan
 
@@ -74,3 +77,91 @@ def test_a_stage_that_kept_its_reference_is_not_homed_again(
     stops = [n for n, call in enumerate(calls) if call.endswith(".stop")]
     moves = [n for n, call in enumerate(calls) if call.endswith(".start_move")]
     assert max(stops[:3]) < min(moves)  # whatever still moved has been stopped first
+
+
+class Pausing(PassThrough):
+    """Axis during some of whose calls the computer pauses, so that its stage is stopped.
+
+    `calls` counts the moves begun; `pauses` names a method and the moves in which it is hit.
+    """
+
+    def __init__(self, device: object, method: str, pauses: set[int], homed: bool = True) -> None:
+        super().__init__(device)
+        self._method, self._pauses, self._homed = method, pauses, homed
+        self.moves = 0
+        self.read_back: list[str] = []
+
+    def start_move(self, angle_deg: float) -> None:
+        self.moves += 1
+        if self._method == "start_move" and self.moves in self._pauses:
+            raise ComputerPaused("theta_r: the computer paused for 1.3 s while it moved")
+        self._device.start_move(angle_deg)  # type: ignore[attr-defined]  # an axis
+
+    def finish_move(self) -> None:
+        if self._method == "finish_move" and self.moves in self._pauses:
+            raise ComputerPaused("theta_r: the computer paused for 1.3 s while it moved")
+        self._device.finish_move()  # type: ignore[attr-defined]  # an axis
+
+    def homed(self) -> bool:
+        self.read_back.append("homed")
+        return self._homed
+
+    def position_deg(self) -> float:
+        self.read_back.append("position")
+        return self._device.position_deg()  # type: ignore[attr-defined,no-any-return]  # an axis
+
+
+def paused_scan(small: Loaded, record: Record, **keys: object) -> tuple[Pausing, Exception | None]:
+    devices = open_devices(small)
+    axis = Pausing(devices.axes["theta_r"], **keys)  # type: ignore[arg-type]  # as given
+    axes = devices.axes | {"theta_r": axis}
+    try:
+        scan(small, record, changed_devices=lambda _: replace(devices, axes=axes))  # type: ignore[arg-type]  # stand-ins
+    except ComputerPaused as error:
+        return axis, error
+    return axis, None
+
+
+@pytest.mark.parametrize("method", ["start_move", "finish_move"])
+def test_after_a_pause_of_the_computer_the_move_is_made_again(
+    small: Loaded, whole: list[Reading], record: Record, method: str
+) -> None:
+    axis, error = paused_scan(small, record, method=method, pauses={2, 5, 9})
+    assert error is None
+    assert undated(record.readings()) == undated(whole)
+    assert axis.read_back[:2] == ["homed", "position"]
+
+
+@pytest.mark.parametrize("method", ["start_move", "finish_move"])
+@pytest.mark.parametrize(
+    ("pauses", "homed", "says"),
+    [
+        ({2, 3}, True, "again in this move, which is too often to go on"),
+        ({2, 4, 6, 8}, True, "4 times in this scan, which is too often to go on"),
+        ({2}, False, "theta_r has lost its reference"),
+    ],
+)
+def test_pauses_end_the_scan_beyond_their_bounds(
+    small: Loaded, record: Record, method: str, pauses: set[int], homed: bool, says: str
+) -> None:
+    axis, error = paused_scan(small, record, method=method, pauses=pauses, homed=homed)
+    assert says in str(error)
+    assert axis.moves == max(pauses)  # and nothing moves after it
+
+
+def test_the_axis_that_moves_is_stopped_first(small: Loaded, record: Record) -> None:
+    """A stop may wait for a port that has vanished: what moves must not wait behind it."""
+    calls: list[str] = []
+    devices = open_devices(small)
+
+    class Failing(Spy):
+        def __getattr__(self, name: str) -> object:
+            if name == "finish_move" and self._name == "theta_r":
+                raise DeviceError("theta_r: is gone")
+            return super().__getattr__(name)
+
+    axes = {name: Failing(axis, calls, name) for name, axis in devices.axes.items()}
+    with pytest.raises(DeviceError, match="is gone"):
+        scan(small, record, changed_devices=lambda _: replace(devices, axes=axes))  # type: ignore[arg-type]  # stand-ins
+    stops = [call for call in calls if call.endswith(".stop")]
+    assert stops == ["theta_r.stop", "theta_i.stop", "dphi.stop"]
