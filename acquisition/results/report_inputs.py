@@ -85,7 +85,7 @@ def candidates(fitted: Fitted) -> tuple[Candidate, ...]:
 
 
 def _curve(result: FitResult) -> Curve:
-    def curve(theta_i_deg: float, dphi_deg: float, theta_r_deg: FloatArray) -> FloatArray:
+    def curve(theta_i_deg: FloatArray, dphi_deg: FloatArray, theta_r_deg: FloatArray) -> FloatArray:
         geometry = Geometry.from_degrees(theta_i=theta_i_deg, theta_r=theta_r_deg, dphi=dphi_deg)
         return result.brdf(geometry)
 
@@ -129,4 +129,10 @@ def _time_rows(record: Record) -> Rows:
         "planned_s": "planned (s)",
         "scan_s": "took (s)",
     }
-    return tuple((text, record.meta(key) or "unknown") for key, text in labels.items())
+    values = {key: record.meta(key) or "unknown" for key in labels}
+    return tuple((text, _plain_time(values[key])) for key, text in labels.items())
+
+
+def _plain_time(value: str) -> str:
+    """A time in UTC as a person reads it; any other text as it is."""
+    return value.replace("T", " ").removesuffix("+00:00") if value.endswith("+00:00") else value

@@ -6,15 +6,18 @@ The entry point is `write_report`. Every text from the record is escaped.
 from __future__ import annotations
 
 import base64
-import html
 import math
+import re
 import struct
 from collections.abc import Iterable
 from pathlib import Path
 
-from analysis.report import charts
-from analysis.report.data import Candidate, Parameter, PlottedSweep, ReportData, Rows, group_sweeps
-from analysis.report.style import CSS, format_value, html_page
+from analysis.report import captions, charts
+from analysis.report.data import Candidate, Parameter, ReportData, Rows
+from analysis.report.polar import polar_chart
+from analysis.report.style import CSS, escaped, format_value, html_page, short_number
+from analysis.report.sweeps import PlottedSweep, group_sweeps
+from analysis.report.swept_axis import VIEW
 from instrument.record.reading import Preview
 from instrument.text.atomic_file import write_whole
 
@@ -49,13 +52,7 @@ def report_html(data: ReportData) -> str:
         _pictures(data.previews),
         _facts(data),
     ]
-    return html_page(_text(data.title), CSS, body)
-
-
-def _text(raw: str) -> str:
-    """Escape a text from the record for HTML and XML."""
-    visible = "".join(c if c.isprintable() or c in "\n\t\u00a0" else "\ufffd" for c in raw)
-    return html.escape(visible)
+    return html_page(escaped(data.title), CSS, body)
 
 
 def _number(value: float | None, form: str) -> str:
@@ -63,32 +60,19 @@ def _number(value: float | None, form: str) -> str:
 
 
 def _head(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
-    lines = [f"<header>\n<h1>{_text(data.title)}</h1>"]
+    lines = [f"<header>\n<h1>{escaped(data.title)}</h1>"]
     if data.sample:
-        lines.append(f'<p class="sample">Sample: <b>{_text(data.sample)}</b></p>')
+        lines.append(f'<p class="sample">Sample: <b>{escaped(data.sample)}</b></p>')
     if data.description:
-        lines.append(f'<p class="text">{_text(data.description)}</p>')
-    return "\n".join([*lines, f'<p class="soft">{_counts(data, sweeps)}</p>\n</header>'])
-
-
-def _counts(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
-    incidences = {s.incidence: f"{round(s.theta_i_deg, 1):g}°" for s in sweeps}
-    planes = {s.plane: f"{s.plane_deg:g}°" for s in sweeps}
-    parts = [f"{len(data.flags)} geometries measured"]
-    if sweeps:
-        parts.append("lamp at " + ", ".join(incidences[i] for i in sorted(incidences)))
-        parts.append("planes Δφ = " + ", ".join(planes.values()) if len(planes) > 1 else "")
-    parts.append(f"{int(data.fitted.sum())} in the fit")
-    flagged = int(data.flagged.sum())
-    parts.append(f"<b>{flagged} flagged</b>" if flagged else "none flagged")
-    return " · ".join(part for part in parts if part)
+        lines.append(f'<p class="text">{escaped(data.description)}</p>')
+    return "\n".join([*lines, f'<p class="soft">{captions.counts(data, sweeps)}</p>\n</header>'])
 
 
 def _verdict(data: ReportData) -> str:
     kind, state = _STATES.get(data.verdict_kind, ("", ""))
     headline, *more = data.verdict or ("No model was fitted.",)
     values = [
-        f"<div><dt>{_text(p.name)}</dt><dd>{_value_of(p)}</dd></div>"
+        f"<div><dt>{_name(p.name)}</dt><dd>{_value_of(p)}</dd></div>"
         for candidate in data.candidates
         for p in candidate.parameters
         if candidate.chosen
@@ -97,31 +81,32 @@ def _verdict(data: ReportData) -> str:
         [
             f'<section id="verdict" class="verdict {kind}">',
             f'<div class="state">{state}</div>' if state else "",
-            f'<p class="headline">{_text(headline)}</p>',
-            *(f"<p>{_text(sentence)}</p>" for sentence in more),
+            f'<p class="headline">{_name(headline, "+/_")}</p>',
+            *(f"<p>{escaped(sentence)}</p>" for sentence in more),
             f'<dl class="values">{"".join(values)}</dl>' if values else "",
             "</section>",
         ]
     )
 
 
-def _name(candidate: Candidate) -> str:
-    return _text(candidate.name).replace("+", "+<wbr>")
+def _name(raw: str, joints: str = "+/") -> str:
+    """Escape a text with names of models or parameters, which may wrap after the joints."""
+    return re.sub(rf"(?<=\w)[{joints}](?=\w)", r"\g<0><wbr>", escaped(raw))
 
 
 def _value_of(parameter: Parameter) -> str:
     if parameter.u is None and parameter.interval is not None:
         low, high = (_number(end, ".4g") for end in parameter.interval)
         unit = f"\u00a0{parameter.unit}" if parameter.unit else ""
-        return _text(f"not determined, in [{low}, {high}]{unit}")
-    return _text(format_value(parameter.value, parameter.u, parameter.unit))
+        return escaped(f"not determined, in [{low}, {high}]{unit}")
+    return escaped(format_value(parameter.value, parameter.u, parameter.unit))
 
 
 def _attention(data: ReportData) -> str:
     notes = [*data.notes, *((_NO_TILE,) if data.flags and not data.has_brdf else ())]
     if not notes:
         return ""
-    items = "".join(f"<li>{_text(note)}</li>" for note in notes)
+    items = "".join(f"<li>{escaped(note)}</li>" for note in notes)
     return f'<section id="notes" class="attention notes"><b>Notes</b><ul>{items}</ul></section>'
 
 
@@ -130,79 +115,32 @@ def _charts(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
         return '<h2 id="shape">Measured values</h2>\n<p>No geometry has a value to plot.</p>'
     name = "BRDF" if data.has_brdf else "Radiance"
     quantity = "BRDF (1/sr)" if data.has_brdf else "radiance (counts/s)"
-    shapes, panels = charts.normalised_charts(sweeps), [charts.brdf_chart(sweeps, quantity)]
-    polar = [charts.polar_chart(sweeps, quantity)]
-    figures = (
+    figures = [
         '<h2 id="shape">Shape of the reflection</h2>',
-        _figure(shapes, "normalised radiance", _shape_caption(data, sweeps)),
-        f'<h2 id="brdf">{name} at each incidence</h2>',
-        _figure(panels, quantity, _panel_caption(data, sweeps)),
-        f'<h2 id="polar">{name} around the sample</h2>',
-        _figure(polar, f"{quantity}, polar", _polar_caption(data, sweeps, quantity)),
-    )
+        _figure(
+            charts.shape_charts(sweeps, quantity),
+            f"shape against the {sweeps[0].axis.name}",
+            captions.shape_caption(data, sweeps, quantity),
+        ),
+        f'<h2 id="brdf">{captions.brdf_title(sweeps, name)}</h2>',
+        _figure(
+            [charts.brdf_chart(sweeps, quantity)], quantity, captions.panel_caption(data, sweeps)
+        ),
+    ]
+    if sweeps[0].axis is VIEW:
+        polar = [polar_chart(sweeps, quantity)]
+        caption = captions.polar_caption(data, sweeps, quantity)
+        figures.append(f'<h2 id="polar">{name} around the sample</h2>')
+        figures.append(_figure(polar, f"{quantity}, polar", caption))
     return "\n".join(figures)
 
 
 def _figure(drawings: list[str], label: str, caption: str) -> str:
-    named = f'<svg role="img" aria-label="{_text(label)}" '
+    named = f'<svg role="img" aria-label="{escaped(label)}" '
     drawn = "".join(svg.replace("<svg ", named, 1) for svg in drawings)
-    return f"<figure>\n{drawn}<figcaption>{caption}</figcaption>\n</figure>"
-
-
-def _shape_caption(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
-    caption = [
-        "Radiance relative to its value along the sample’s normal (θᵣ = 0), against the view "
-        "angle. Positive θᵣ is the lamp’s side. Error bars: standard uncertainty u (k = 1), often "
-        "smaller than the markers."
-    ]
-    if any(s.in_plane for s in sweeps):
-        caption.append("▼ marks the lamp’s direction, θᵣ = θᵢ.")
-    if any(not s.in_plane for s in sweeps):
-        caption.append("Δφ is the azimuth of positive θᵣ relative to the lamp’s.")
-    if data.plotted:
-        caption.append(f"Lines: <b>{_text(data.plotted[0].name)}</b>{_scaled(data)}.")
-    if any(c.chosen and c.residuals is not None for c in data.candidates):
-        caption.append(
-            "Below: residuals (measured − model) / u, less the most likely values of the errors "
-            "that points share (tile, lamp angle, placement). About 95 % should lie in the grey "
-            "band of ±2. A pattern over many points is not noise but a misfit of the model."
-        )
-    return " ".join([*caption, _marker_caption(data)])
-
-
-def _scaled(data: ReportData) -> str:
-    return "" if data.has_brdf else ", each scaled to its points"
-
-
-def _marker_caption(data: ReportData) -> str:
-    caption = "Crosses: flagged points." if data.flagged.any() else ""
-    left_out = ~data.fitted & ~data.flagged
-    if left_out.any() and data.fitted.any():
-        caption += " Open markers: points not in the fit."
-    return caption.strip()
-
-
-def _panel_caption(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
-    kinds = ("Solid line", "Dashed", "Dotted")
-    models = data.plotted
-    lines = [f"{kind}: <b>{_text(c.name)}</b>" for kind, c in zip(kinds, models, strict=False)]
-    if lines:
-        lines[0] += " (chosen)" if models[0].chosen else ""
-        lines = [f"{'; '.join(lines)}{_scaled(data)}."]
-    if len(sweeps) > charts.MAX_PANELS:
-        lines.append(f"{charts.MAX_PANELS} of {len(sweeps)} sweeps are shown.")
-    if models and models[0].residuals is not None:
-        lines.append("Points may deviate from a line together, by an error that they share.")
-    return " ".join(["Error bars: u (k = 1).", *lines, _marker_caption(data)])
-
-
-def _polar_caption(data: ReportData, sweeps: tuple[PlottedSweep, ...], quantity: str) -> str:
-    caption = (
-        f"Radius: {quantity}; angle: direction of the camera, with θᵣ = 0 at the top and the "
-        "lamp’s side on the right. A matte (Lambertian) sample would give a half circle."
+    return (
+        f'<figure>\n<div class="chart">{drawn}</div><figcaption>{caption}</figcaption>\n</figure>'
     )
-    caption += " Arrows: direction of the light." if any(s.in_plane for s in sweeps) else ""
-    return caption + (" Flagged points are left out." if data.flagged.any() else "")
 
 
 def _candidates(data: ReportData) -> str:
@@ -212,7 +150,7 @@ def _candidates(data: ReportData) -> str:
     best = min(known, default=None)
     head = ("Model", "Parameters ± u (k = 1)", "#Residual, rms", "#Reduced χ²", "#ΔBIC")
     tag = "✔ chosen" if data.verdict_kind == "adequate" else "best candidate"
-    table = _table(head, (_candidate(c, best, tag) for c in data.ranked))
+    table = _table(head, (_candidate(c, best, tag) for c in data.ranked), "wide candidates")
     return (
         f'<h2 id="candidates">Models compared</h2>\n{table}\n'
         '<p class="soft">Residual: relative to the mean. Reduced χ² near 1: the model agrees with '
@@ -228,27 +166,27 @@ def _candidate(candidate: Candidate, best_bic: float | None, tag: str) -> str:
         above = candidate.bic - best_bic
     note = f'<br><span class="tag">{tag}</span>' if candidate.chosen else ""
     if not candidate.converged:
-        note += f'<br><span class="soft">did not converge: {_text(candidate.message)}</span>'
+        note += f'<br><span class="soft">did not converge: {escaped(candidate.message)}</span>'
     elif not candidate.agrees:
         note += '<br><span class="soft">does not fit</span>'
     parameters = "".join(
-        f'<span class="parameter"><span class="name">{_text(p.name)}</span> {_value_of(p)}</span>'
+        f'<span class="parameter"><span class="name">{escaped(p.name)}</span> {_value_of(p)}</span>'
         for p in candidate.parameters
     )
     rms = candidate.rms_relative
     cells = (
-        _name(candidate) + note,
+        _name(candidate.name) + note,
         parameters,
-        "#" + (f"{_number(100 * rms, '.3g')} %" if math.isfinite(rms) else "—"),
-        "#" + _number(candidate.reduced_chi2, ".3g"),
-        "#" + _number(above, ".3g" if abs(above) >= 1000 else ".1f"),
+        "#" + (f"{short_number(100 * rms, 3)} %" if math.isfinite(rms) else "—"),
+        "#" + short_number(candidate.reduced_chi2, 3),
+        "#" + (_number(above, ".1f") if abs(above) < 1000 else short_number(above, 3)),
     )
     return _row(cells, "chosen" if candidate.chosen else "")
 
 
-def _table(head: Iterable[str], rows: Iterable[str]) -> str:
+def _table(head: Iterable[str], rows: Iterable[str], kind: str = "wide") -> str:
     body = f"<thead>{_row(head, cell='th')}</thead><tbody>{''.join(rows)}</tbody>"
-    return f'<div class="wide"><table>{body}</table></div>'
+    return f'<div class="{kind}"><table>{body}</table></div>'
 
 
 def _row(cells: Iterable[str], style: str = "", cell: str = "td") -> str:
@@ -270,7 +208,7 @@ def _flagged(data: ReportData) -> str:
     for i in at:
         angles = (data.theta_i_deg[i], data.dphi_deg[i], data.theta_r_deg[i])
         measured = format_value(float(value[i]), float(u[i]), unit)
-        cells = (*(f"#{_number(a, 'g')}°" for a in angles), f"#{measured}", _text(data.flags[i]))
+        cells = (*(f"#{_number(a, 'g')}°" for a in angles), f"#{measured}", escaped(data.flags[i]))
         rows.append(_row(cells))
     return (
         '<h2 id="flagged">Flagged points</h2>\n'
@@ -283,7 +221,7 @@ def _budget(data: ReportData) -> str:
     if not data.budget:
         return ""
     rows = (
-        _row((_text(name), f"#{_percent(u)}", f"#{_number(share, '.0f')} %", _bar(share)))
+        _row((escaped(name), f"#{_percent(u)}", f"#{_number(share, '.0f')} %", _bar(share)))
         for name, u, share in data.budget
     )
     return (
@@ -319,7 +257,7 @@ def _pictures(previews: tuple[Preview, ...]) -> str:
 
 
 def _picture(preview: Preview) -> str:
-    caption = f"<figcaption>{_text(preview.caption)}</figcaption>"
+    caption = f"<figcaption>{escaped(preview.caption)}</figcaption>"
     size = _png_size(preview.png)
     if size is None:
         return f"<figure><p>This picture cannot be read.</p>{caption}</figure>"
@@ -362,5 +300,5 @@ def _facts(data: ReportData) -> str:
 
 
 def _fact(name: str, title: str, rows: Rows) -> str:
-    body = "".join(_row((_text(label), _text(value))) for label, value in rows)
+    body = "".join(_row((escaped(label), escaped(value))) for label, value in rows)
     return f'<section id="{name}"><h3>{title}</h3><table><tbody>{body}</tbody></table></section>'

@@ -5,6 +5,7 @@ Suitable for screens and for black-and-white printers.
 
 from __future__ import annotations
 
+import html
 import io
 import math
 import re
@@ -119,6 +120,11 @@ def format_value(value: float, u: float | None, unit: str = "") -> str:
     return f"{text}{suffix}" if plain else f"({text}){_times_ten_to(power)}{suffix}"
 
 
+def short_number(value: float | None, digits: int) -> str:
+    """Format a number with at most `digits` significant digits, without unit: 0.709, 1.79 × 10⁴."""
+    return "—" if value is None or not math.isfinite(value) else _general(value, digits)
+
+
 def _exponent(number: float, digits: int) -> int:
     """Power of ten of the first of `digits` significant digits, 0 for 0."""
     return int(f"{number:.{digits - 1}e}".partition("e")[2])
@@ -138,6 +144,12 @@ def _rounded(number: float, last: int, power: int) -> str:
 
 def _times_ten_to(power: int) -> str:
     return "\u00a0×\u00a010" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def escaped(raw: str) -> str:
+    """Return a text from outside as HTML and XML; characters that cannot be shown are replaced."""
+    visible = "".join(c if c.isprintable() or c in "\n\t\u00a0" else "\ufffd" for c in raw)
+    return html.escape(visible)
 
 
 def html_page(title: str, css: str, body: Iterable[str]) -> str:
@@ -179,9 +191,9 @@ dl.values { margin-bottom: 0; }
 .attention { margin: 12px 0; padding: 8px 16px; border-left: 4px solid #c05a00; }
 .attention ul { margin: 0; padding-left: 20px; }
 figure { margin: 10px 0 18px; }
-figure > svg { display: block; width: 100%; height: auto; }
-figure > svg text { font-family: system-ui, "Segoe UI", "Helvetica Neue", Arial, "DejaVu Sans",
-  sans-serif !important; }
+figure > svg, .chart > svg { display: block; width: 100%; height: auto; }
+figure > svg text, .chart > svg text { font-family: system-ui, "Segoe UI", "Helvetica Neue", Arial,
+  "DejaVu Sans", sans-serif !important; }
 figcaption { color: var(--soft); font-size: 14px; margin-top: 4px; }
 figcaption b { color: var(--ink); }
 .wide { overflow-x: auto; }
@@ -208,7 +220,27 @@ td svg.share { display: block; width: 220px; height: 14px; }
 body { overflow-wrap: break-word; }
 .facts td { overflow-wrap: anywhere; }
 .facts td:first-child { color: var(--soft); width: 40%; }
-@media (max-width: 700px) { .facts { grid-template-columns: 1fr; } }
+@media (max-width: 700px) {
+  body { padding: 16px 14px 32px; }
+  .verdict { padding: 12px 14px; }
+  .verdict .headline { font-size: 18px; }
+  .chart { overflow-x: auto; }
+  .chart > svg { width: 700px; }
+  .chart + figcaption::before { content: "Swipe the chart sideways. "; }
+  .facts { grid-template-columns: 1fr; }
+  .wide th, .wide td { padding-right: 8px; }
+  td svg.share { display: none; }
+  .candidates thead { display: none; }
+  .candidates tr { display: block; padding: 6px 0; border-bottom: 1px solid var(--rule); }
+  .candidates td { display: block; border: 0; padding: 2px 8px; }
+  .candidates td.number { display: inline-block; text-align: left; padding-right: 18px; }
+  .candidates td.number::before { color: var(--soft); font-size: 13px; content: "rms "; }
+  .candidates td:nth-child(4)::before { content: "χ²/dof "; }
+  .candidates td:nth-child(5)::before { content: "ΔBIC "; }
+  .candidates .parameter { white-space: normal; }
+  .candidates tr.chosen { background: #eef8f4; border-left: 8px solid #00734f; }
+  .candidates tr.chosen td, .candidates tr.chosen td:first-child { border: 0; }
+}
 @media print {
   @page { margin: 14mm; }
   body { max-width: none; padding: 0; font-size: 11pt; }

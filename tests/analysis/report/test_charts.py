@@ -1,22 +1,81 @@
-"""Charts of the report: planes and thinned sweeps."""
+"""Charts of the report: what is drawn of many sweeps, and against which angle."""
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
+from analysis.report import charts
 from analysis.report.page import report_html
-from tests.support.analysis.report_data import data_of, words
+from analysis.report.sweeps import group_sweeps
+from tests.support.analysis.report_data import data_of, without_tile, words
+
+VIEWS = tuple(np.arange(-70.0, 71.0, 5.0))
 
 
-class TestSweeps:
-    def test_many_sweeps_are_thinned_and_the_caption_states_it(self) -> None:
-        incidences = tuple(np.arange(0.0, 70.0, 5.0))
-        page = report_html(data_of(incidences, theta_r=(-30.0, 30.0)))
-        assert "12 of 14 sweeps are shown" in page
+def _shape(page: str) -> str:
+    """Text of the charts of the shape and of their caption."""
+    return words(page[page.index('id="shape"') : page.index('id="brdf"')])
+
+
+def test_many_sweeps_are_thinned_and_the_captions_state_it() -> None:
+    page = report_html(data_of(tuple(np.arange(0.0, 70.0, 5.0)), theta_r=VIEWS))
+    assert "12 of 14 sweeps are shown" in page
+    assert "12 of 14 series are shown" in _shape(page)
+    assert _shape(page).count("lamp at θᵢ =") == 12
 
 
 def test_several_planes_are_named() -> None:
-    page = report_html(data_of((30.0,), (0.0, 45.0, 90.0), (-30.0, 0.0, 30.0)))
-    text = words(page)
+    page = report_html(data_of((30.0,), (0.0, 45.0, 90.0), VIEWS))
     for plane in ("Δφ = 0° (negative θᵣ: Δφ = 180°)", "Δφ = 45° (negative θᵣ: Δφ = 225°)"):
-        assert plane in text
+        assert plane in _shape(page)
+
+
+def test_many_planes_are_thinned() -> None:
+    page = report_html(data_of((30.0,), tuple(np.arange(0.0, 180.0, 10.0)), VIEWS))
+    assert "6 of 18 planes are shown" in _shape(page)
+    assert "18 angles from 0° to 350°" in page
+
+
+@pytest.mark.parametrize("tile", [True, False])
+def test_a_moving_lamp_is_drawn_against_its_angle(tile: bool) -> None:
+    """31 lamp angles and one view are one series, not 31 entries of a legend."""
+    data = data_of(tuple(np.linspace(0.0, 75.0, 31)), theta_r=(45.0,))
+    shown = _shape(report_html(data if tile else without_tile(data)))
+    assert shown.count("camera at θᵣ = 45°") == 1
+    assert "lamp angle θᵢ (°), on the camera’s side" in shown
+    assert "camera 45°" in shown  # where lamp and camera meet
+    assert "lamp at" not in shown
+    assert "lamp angle θᵢ from 0° to 75°" in report_html(data)
+
+
+def test_an_azimuth_sweep_is_drawn_against_the_azimuth() -> None:
+    page = report_html(data_of((45.0,), tuple(np.linspace(0.0, 180.0, 19)), (30.0, 60.0)))
+    shown = _shape(page)
+    assert "azimuth Δφ (°) from the lamp’s side" in shown
+    assert "lamp at θᵢ = 45°" in shown
+    assert (shown.count("camera at θᵣ = 30°"), shown.count("camera at θᵣ = 60°")) == (1, 1)
+
+
+def test_deviations_are_shown_in_per_cent_beside_residuals_in_u() -> None:
+    data = data_of()
+    shown = _shape(report_html(data))
+    assert "deviation (%)" in shown
+    assert "residual / u" in shown
+    bare = _shape(report_html(replace(data, candidates=())))
+    assert "deviation" not in bare
+    assert "residual" not in bare
+
+
+def test_every_number_of_a_legend_has_its_line() -> None:
+    """Series keep colour and marker of their number where some are left out."""
+    sweeps = group_sweeps(data_of(tuple(np.arange(0.0, 70.0, 5.0)), theta_r=VIEWS))
+    shown = charts.thinned_series(sweeps)
+    assert [s.series for s in shown][:1] == [0]
+    assert [s.series for s in shown][-1:] == [13]
+    (svg,) = charts.shape_charts(sweeps, "BRDF (1/sr)")
+    labels = re.findall(r"lamp at θᵢ = ([0-9]+)°", svg)
+    assert labels == [f"{s.series_deg:g}" for s in shown]

@@ -229,7 +229,7 @@ def test_flagged_points_are_listed_and_crossed() -> None:
     page = report_html(replace(data, flags=flags, fitted=fitted, candidates=(model,)))
     assert "saturated: 3 pixels" in page
     assert "<b>1 flagged</b>" in page
-    assert "Crosses: flagged points." in page
+    assert "Crosses: flagged points; outliers may lie outside." in page
 
 
 def test_window_is_drawn_about_the_centres_of_its_pixels(page: str) -> None:

@@ -18,13 +18,13 @@ from instrument.record.reading import Preview
 NAN = float("nan")
 
 
-def tilted(theta_i_deg: float, dphi_deg: float, theta_r_deg: FloatArray) -> FloatArray:
+def tilted(theta_i_deg: FloatArray, dphi_deg: FloatArray, theta_r_deg: FloatArray) -> FloatArray:
     """BRDF that rises towards the lamp's side, as of a rough matte surface."""
     towards = np.sin(np.radians(theta_r_deg)) * np.cos(np.radians(dphi_deg))
     return np.asarray(0.25 + 0.1 * np.sin(np.radians(theta_i_deg)) * towards)
 
 
-def flat(theta_i_deg: float, dphi_deg: float, theta_r_deg: FloatArray) -> FloatArray:
+def flat(theta_i_deg: FloatArray, dphi_deg: FloatArray, theta_r_deg: FloatArray) -> FloatArray:
     return np.full(np.shape(theta_r_deg), 0.25)
 
 
@@ -48,7 +48,7 @@ def data_of(
 ) -> ReportData:
     rows = [(i, d, r) for d in dphis for i in incidences for r in theta_r]
     theta_i_deg, dphi_deg, theta_r_deg = np.array(rows, dtype=np.float64).T
-    brdf = np.array([float(tilted(i, d, np.array(r))) for i, d, r in rows])
+    brdf = tilted(theta_i_deg, dphi_deg, theta_r_deg)
     points = len(rows)
     good = Candidate(
         name="oren_nayar",
@@ -102,8 +102,8 @@ def data_of(
     return replace(data, **changes)
 
 
-def without_tile() -> ReportData:
-    data = data_of()
+def without_tile(data: ReportData | None = None) -> ReportData:
+    data = data_of() if data is None else data
     none = np.full(len(data.flags), NAN)
     nothing = np.zeros(len(data.flags), dtype=bool)
     return replace(data, brdf=none, u_brdf=none, fitted=nothing, candidates=(), verdict_kind="")
