@@ -59,7 +59,10 @@ def _linear_limits(low: float, high: float) -> tuple[float, float]:
 
 
 def set_symmetric_axis(ax: Axes, arrays: Sequence[FloatArray], least: float) -> float:
-    """Set limits about zero that hold all finite values, at least ±`least`; return the limit."""
+    """Set limits about zero that hold all finite values of arrays (N,), at least ±`least`.
+
+    Values and limit have the unit of the axis; returns the limit.
+    """
     low, high = _extent(arrays)
     largest = max(abs(low), abs(high)) if np.isfinite(low) else 0.0
     limit = max(least, 1.15 * largest)

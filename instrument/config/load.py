@@ -84,7 +84,7 @@ def load_protocol(
 def _read(path: Path, role: type[Section]) -> _File:
     """Read a file. Raises `InputError` if it is none of that role."""
     file = _File(path, read_yaml(yaml_bytes(path)))
-    text = wrong_role(file.marked.data, role) if file.marked.readable else None
+    text = None if file.found else wrong_role(file.marked.data, role)
     if text is not None:
         raise InputError(f"{file.name}: {text}")
     return file

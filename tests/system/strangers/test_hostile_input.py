@@ -243,7 +243,7 @@ def test_reading_of_a_table_stops_after_many_mistakes(tmp_path: Path) -> None:
     path.write_bytes(BARE.encode() + b"xy\n" * 100_000)
     with pytest.raises(InputError) as refused:
         read_csv(path)
-    assert refused.value.problems[-1] == "... and at least 9980 more"
+    assert refused.value.problems[-1].startswith("... and at least 9997 more like ")
     path.write_bytes(BARE.encode() + b"\n" * 3_000_000)
     with pytest.raises(InputError, match="lines; allowed: 2000000; split it"):
         read_csv(path)
