@@ -35,7 +35,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     real.addoption("--stage-port", help="of a real stage: /dev/serial/by-id/..., tcp://host:port")
     real.addoption("--stage-driver", default="newport", choices=["newport", "oriental", "zaber"])
     real.addoption("--stage-scale", type=float, default=1000.0, help="steps a degree")
-    real.addoption("--camera", help="of a real camera: /dev/v4l/by-id/...")
+    real.addoption("--rig", type=Path, help="the rig file that names the real devices")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
