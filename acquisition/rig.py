@@ -92,6 +92,8 @@ class OpenRig(Closeable):
         self._faults = (faults or Faults.from_environment()) if rig.simulated else None
         self._scene = None if rig.real else scene or Scene.of_white_sample(rig)
         self.clock: Clock = SimulatedClock() if rig.simulated else SystemClock()
+        if self._scene is not None:
+            self._scene.use_clock(self.clock)
         self.operator = self._operator()
         self.lamp = self._lamp()
 
@@ -122,10 +124,10 @@ class OpenRig(Closeable):
         self._closing.callback(camera.close)
         return camera
 
-    def begin_step(self, step: int, planned_s: float) -> None:
-        """Announce the next step of the plan and its time to a scene; a real rig ignores it."""
+    def begin_step(self, step: int, scan_s: float) -> None:
+        """Announce the next step and the scan's own time to a scene; a real rig ignores it."""
         if self._scene is not None:
-            self._scene.begin_step(step, planned_s)
+            self._scene.begin_step(step, scan_s)
 
     def pose_scene(self, theta_r_deg: float) -> None:
         """Set the axes of a scene so that the camera sees the lit sample; moves nothing real."""

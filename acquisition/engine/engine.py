@@ -38,7 +38,7 @@ from instrument.record.record import Record
 class Devices:
     """Devices that the engine drives.
 
-    `begin_step` passes a step's index and planned time to a simulated scene. `close` releases all
+    `begin_step` passes a step's index and the scan time to a simulated scene. `close` releases all
     devices.
     """
 
@@ -142,7 +142,7 @@ class Engine:
             return
         # An index of its own, so that a simulated scene draws new noise.
         step = replace(original, index=len(plan.steps) + len(progress.checks), preview=False)
-        self._devices.begin_step(step.index, first.start_s)
+        self._devices.begin_step(step.index, progress.elapsed_s)
         self._place(step.surface)
         self._positioner.move_to(step.pose)
         elapsed_s = progress.elapsed_s
@@ -164,7 +164,7 @@ class Engine:
     def _scan(self, plan: Plan, steps: Sequence[Step]) -> None:
         waiting = None
         for step in steps:
-            self._devices.begin_step(step.index, step.start_s + step.duration_s)
+            self._devices.begin_step(step.index, self._exposer.scan_s())
             if step.surface != self._positioner.surface:
                 self._accept(waiting)  # the operator may take their time, or give up
                 waiting = None

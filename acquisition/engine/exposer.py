@@ -32,7 +32,7 @@ MAX_EXPOSURES_TRIED = 8  # spans the ladder of any camera in factors of four
 class Exposed:
     """Frames of a step with their dark, ready to be reduced.
 
-    `time_s`: scan time at the end of the frames. `free_s`: scan time from which the rig may move.
+    `time_s`: scan time at the middle of the frames. `free_s`: that from which the rig may move.
     """
 
     step: Step
@@ -85,17 +85,21 @@ class Exposer:
     def expose(self, step: Step, window: Window) -> Exposed:
         """Take all frames of a step, unsaturated if the camera's exposure range allows it."""
         *tried, first = self._search(step, window)
-        frames = [first]
+        frames, first_s = [first], self.scan_s()
         if step.frames > 1:
             frames += self.camera.grab(step.frames - 1)
         require_possible_times(frames)
-        time_s, utc = round(self._scan_s(), 3), self.clock.utc().isoformat()
+        time_s = round((first_s + self.scan_s() - first.exposure_s) / 2, 3)
+        utc = self.clock.utc().isoformat()
         dark = self._dark(first.exposure_s)
         self._check.require_proportional(tried, frames, self._darks, window)
-        return Exposed(step, frames, dark, time_s=time_s, free_s=self._scan_s(), time_utc=utc)
+        return Exposed(step, frames, dark, time_s=time_s, free_s=self.scan_s(), time_utc=utc)
 
-    def _scan_s(self) -> float:
-        """Return the scan time, without waiting for a lost camera and checking exposures."""
+    def scan_s(self) -> float:
+        """Return the scan time: seconds since its start, without interruptions.
+
+        Waiting for a lost camera and checking exposures do not count either.
+        """
         return self._connected_s() - self._start_s - self._check.spent_s
 
     def _connected_s(self) -> float:

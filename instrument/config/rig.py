@@ -66,7 +66,7 @@ class LampConfig(Section):
 class Simulation(Section):
     """Hidden properties of a simulated rig: noise seed, lamp drift, position of the sample.
 
-    `sample_height_mm`: distance of the surface from the rotation axis, towards the camera.
+    `sample_height_mm`: distance of the sample's surface from the rotation axis, towards the camera.
     `lamp_drift_per_hour`: relative change of the lamp's output.
     """
 

@@ -23,8 +23,8 @@ class Reading:
     and `u_texture_dn` from the texture at the window's edge, to second order of the placement, and
     from hot pixels, which are left out, and saturated ones. `window_pixels`: the area that counts.
     `lamp_setting` counts the positions of the lamp, `block` the times that it was set by hand.
-    `time_s` is the scan time at the end of the frames, without interruptions of the scan; `free_s`
-    is the time at which the rig could move on, the dark having been taken.
+    `time_s` is the scan time at the middle of the frames, without interruptions of the scan;
+    `free_s` is the time at which the rig could move on, the dark having been taken.
     """
 
     step: int

@@ -47,6 +47,8 @@ class SimulatedCamera:
 
     def _frame(self) -> Frame:
         exposure_s = true_exposure_s(self._set_s, self._defects)
-        self._clock.sleep(exposure_s + self._settings.frame_overhead_s)
-        image = limit_range(self._sensor.picture(exposure_s), self._defects)
-        return Frame(image, read_back_s(self._set_s, self._defects), self._clock.now_s())
+        self._clock.sleep(self._settings.frame_overhead_s + exposure_s / 2)
+        image = self._sensor.picture(exposure_s)  # in the middle: the mean of a drifting lamp
+        self._clock.sleep(exposure_s / 2)
+        taken = limit_range(image, self._defects)
+        return Frame(taken, read_back_s(self._set_s, self._defects), self._clock.now_s())

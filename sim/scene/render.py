@@ -53,9 +53,7 @@ def electrons_per_s(scene: Scene) -> FloatImage:
 
 def _project(scene: Scene) -> _Projection:
     pinhole, size = Pinhole.of(scene.rig), scene.size
-    homography = pinhole.homography(
-        scene.true_deg["theta_r"], scene.rig.simulation.sample_height_mm
-    )
+    homography = pinhole.homography(scene.true_deg["theta_r"], scene.heights_mm[scene.surface])
     corners = apply_homography(homography, rectangle_mm(size.width_mm, size.height_mm))
     return _Projection(homography, polygon_coverage(corners, pinhole.width_px, pinhole.height_px))
 
@@ -93,7 +91,7 @@ def _chebyshev_grid(pixels: int) -> tuple[FloatArray, FloatImage]:
 
 def _radiance_at(scene: Scene, points_mm: FloatArray) -> FloatArray:
     """Radiance at points (..., 2) of the surface, seen from the lens."""
-    height = np.full(points_mm.shape[:-1], scene.rig.simulation.sample_height_mm)
+    height = np.full(points_mm.shape[:-1], scene.heights_mm[scene.surface])
     flat = np.dstack([points_mm, height]).reshape(-1, 3)
     angles = (scene.true_deg["theta_i"], scene.true_deg["theta_r"], scene.true_deg["dphi"])
     values = radiance(scene.brdf(), flat, *angles, _acceptance(scene), _rings(scene))

@@ -2,8 +2,9 @@
 
 Simulated stages and the simulated operator change it; the simulated camera renders it. Each random
 stream is keyed by the rig's seed and by what it belongs to (an axis and an angle; a step of the
-plan and a frame), never by the number of calls, and the lamp drifts with planned time. The same
-protocol therefore gives the same bytes, whether the scan ran in one go or was resumed.
+plan and a frame), never by the number of calls, and the lamp drifts with the scan's own time, in
+which interruptions do not count. The same protocol therefore gives the same bytes, whether the scan
+ran in one go or was resumed.
 """
 
 from __future__ import annotations
@@ -16,10 +17,12 @@ import numpy as np
 
 from analysis.accuracy.render_brdf import adequate_brdf
 from analysis.models import MODELS
+from instrument.clock import Clock
 from instrument.config.protocol import PatchConfig, Protocol, Sample, SimulatedSample, WhiteTile
 from instrument.config.rig import Rig
 from instrument.devices import Surface
 from instrument.geometry import Brdf, FloatArray, IntArray
+from sim.clock import SimulatedClock
 
 
 def stream_key(name: str) -> int:
@@ -33,7 +36,9 @@ class Scene:
 
     sample: reflectance of the sample. size: its extent. patch: the part of it that is measured.
     true_deg: true angle of each axis in degrees; it differs from the commanded one by the axis
-    error. rings: see `sim.scene.render`; cache of the averaging needed for each place of the lamp.
+    error. clock: by which the lamp drifts. rings: see `sim.scene.render`; cache of the averaging
+    needed for each place of the lamp. heights_mm: height of each surface above the rotation axis;
+    that of the tile is drawn from the rig's uncertainty of placement.
     """
 
     rig: Rig
@@ -44,10 +49,19 @@ class Scene:
     surface: Surface = "sample"
     lit: bool = True
     step: int = 0
-    planned_s: float = 0.0
+    clock: Clock = field(default_factory=SimulatedClock)
     true_deg: dict[str, float] = field(default_factory=dict)
     rings: dict[tuple[str, float, float], IntArray] = field(default_factory=dict)
     _texture: FloatArray | None = None
+    heights_mm: dict[Surface, float] = field(init=False)
+    _lamp_start_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        tile_mm = self.rig.u_placement_mm * self.random(stream_key("tile height")).standard_normal()
+        self.heights_mm = {
+            "sample": self.rig.simulation.sample_height_mm,
+            "white tile": float(tile_mm),
+        }
 
     @classmethod
     def of(cls, rig: Rig, protocol: Protocol) -> Scene:
@@ -68,12 +82,17 @@ class Scene:
             None,
         )
 
-    def begin_step(self, step: int, planned_s: float) -> None:
-        """Select the noise of the plan's step `step` and the lamp's age `planned_s`.
+    def use_clock(self, clock: Clock) -> None:
+        """Let the lamp drift by this clock, from now on."""
+        self.clock = clock
+        self.begin_step(self.step, 0.0)
 
-        planned_s: planned time of the reading in seconds since the start of the scan.
+    def begin_step(self, step: int, scan_s: float) -> None:
+        """Select the noise of the plan's step `step`, and set the lamp's age.
+
+        scan_s: seconds since the start of the scan, without interruptions.
         """
-        self.step, self.planned_s = step, planned_s
+        self.step, self._lamp_start_s = step, self.clock.now_s() - scan_s
 
     def random(self, *key: int) -> np.random.Generator:
         """Return the random stream that belongs to `key` and the rig's seed."""
@@ -112,8 +131,9 @@ class Scene:
         return float(min(1.0, tile.reflectance + error))
 
     def lamp_level(self) -> float:
-        """Return the lamp's output relative to the start of the scan."""
-        return 1.0 + self.rig.simulation.lamp_drift_per_hour * self.planned_s / 3600.0
+        """Return the lamp's output now, relative to the start of the scan."""
+        age_s = self.clock.now_s() - self._lamp_start_s
+        return 1.0 + self.rig.simulation.lamp_drift_per_hour * age_s / 3600.0
 
     def mottling(self) -> tuple[FloatArray, float]:
         """Return the sample's relative albedo variation (rows, columns), mean 0, and its spacing.

@@ -58,10 +58,8 @@ class PlacingOperator:
     def ask(self, request: Request) -> str:
         """Carry out a request; a placing draws the height."""
         if request.action == "place":
-            scene = self._operator._scene
             height = float(self._u_mm * self._random.standard_normal())
-            simulation = scene.rig.simulation.model_copy(update={"sample_height_mm": height})
-            scene.rig = scene.rig.model_copy(update={"simulation": simulation})
+            self._operator._scene.heights_mm[request.surface] = height
         return self._operator.ask(request)
 
 

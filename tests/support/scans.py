@@ -63,7 +63,7 @@ def changed(loaded: Loaded, rig: dict[str, Any] | None = None, **protocol: Any) 
 
 
 def exact_rig(rig: Rig) -> Rig:
-    """Copy of the rig without simulated errors: exact angles, sample on the axis, constant lamp."""
+    """Copy of the rig without simulated errors: exact angles and heights, constant lamp."""
     axes = rig.axes.model_copy(
         update={
             n: rig.axes[n].model_copy(update={"u_deg": 0.0}) for n in ("theta_i", "dphi", "theta_r")
@@ -72,7 +72,7 @@ def exact_rig(rig: Rig) -> Rig:
     simulation = rig.simulation.model_copy(
         update={"sample_height_mm": 0.0, "lamp_drift_per_hour": 0.0}
     )
-    return rig.model_copy(update={"axes": axes, "simulation": simulation})
+    return rig.model_copy(update={"axes": axes, "simulation": simulation, "u_placement_mm": 0.0})
 
 
 def simulated_scene(loaded: Loaded, theta_i: float = 45.0, theta_r: float = 0.0) -> Scene:

@@ -50,10 +50,10 @@ def at_step(
     def opening(loaded: object) -> Devices:
         devices = open_devices(LOADED)
 
-        def begin_step(number: int, planned_s: float) -> None:
+        def begin_step(number: int, scan_s: float) -> None:
             if number == step:
                 happens(devices)
-            devices.begin_step(number, planned_s)
+            devices.begin_step(number, scan_s)
 
         return replace(devices, begin_step=begin_step)
 
@@ -109,9 +109,9 @@ def test_a_clock_that_is_set_back_changes_the_dates_and_nothing_else(
         devices = open_devices(LOADED)
         clock = SetBack(devices.clock)
 
-        def begin_step(number: int, planned_s: float) -> None:
+        def begin_step(number: int, scan_s: float) -> None:
             clock.back = timedelta(hours=number >= 6)
-            devices.begin_step(number, planned_s)
+            devices.begin_step(number, scan_s)
 
         return replace(devices, clock=clock, begin_step=begin_step)  # type: ignore[arg-type]  # a stand-in
 
