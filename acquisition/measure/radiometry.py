@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition.measure.hot_pixels import find_hot_pixels, without_hot_pixels
 from acquisition.measure.placement import Placement, placement_u_dn
+from acquisition.measure.rounding import dark_rounding_dn, rounding_u_dn
 from acquisition.measure.window import Window
 from instrument.config.camera import CameraConfig
 from instrument.devices import Frame, Image
@@ -86,18 +87,18 @@ def measure(
     saturated = [(crop >= camera.max_dn) & window.counted for crop in crops]
     saturated_weight = float(np.mean([window.weights[pixels].sum() for pixels in saturated]))
     peak = bright_level(counted[0]) if counted[0].size else float("nan")
-    u_dark_noise = _u_noise(window, dark.variance[window.crop] / dark.frames)
+    dark_mean, dark_variance = dark.mean[window.crop], dark.variance[window.crop]
+    rounding, u_rounding = dark_rounding_dn(dark_mean, dark_variance, window.weights, dark.frames)
+    u_dark_noise = _u_noise(window, dark_variance / dark.frames)
     u_placement, u_texture = placement_u_dn(frames, dark.mean, window, placement)
     u_hot = hot_share * _spread(mean - dark.mean[window.crop], window)
     # A saturated pixel is short of its true count by up to full scale, or more.
     u_saturated = saturated_weight * (camera.max_dn - camera.black_level_dn)
     return Signal(
-        signal_dn=window.mean(mean - dark.mean[window.crop]),
+        signal_dn=window.mean(mean - dark_mean + rounding),
         u_noise_dn=_u_noise(window, variance / len(frames)),
         u_quantisation_dn=_u_rounding(window.mean(mean), camera),
-        u_dark_dn=float(
-            np.hypot(u_dark_noise, _u_rounding(window.mean(dark.mean[window.crop]), camera))
-        ),
+        u_dark_dn=float(np.hypot(u_dark_noise, u_rounding)),
         u_placement_dn=u_placement,
         u_texture_dn=math.hypot(u_texture, u_hot, u_saturated),
         window_pixels=window.pixels,
@@ -151,18 +152,6 @@ def _photon_transfer(mean: FloatArray, camera: CameraConfig) -> FloatArray:
     electrons = np.maximum(mean - camera.black_level_dn, 0.0) * gain
     variance: FloatArray = (electrons + camera.read_noise_electrons**2) / gain**2
     return variance
-
-
-def rounding_u_dn(noise_variance_dn2: float) -> float:
-    """Return the error (standard deviation, DN) of the mean of many counts rounded to integers.
-
-    Without noise every pixel rounds alike: 1/sqrt(12) DN. Normal noise of variance s^2 dithers it:
-    the k-th term of the sawtooth error's Fourier series is damped by exp(-2 pi^2 k^2 s^2)
-    (Widrow and Kollar, Quantization Noise, 2008, chapter 4). Averaged over all levels.
-    """
-    k = np.arange(1, 2000)
-    damped = np.exp(-4 * np.pi**2 * k**2 * noise_variance_dn2) / (2 * np.pi**2 * k**2)
-    return float(np.sqrt(damped.sum()))
 
 
 def _flags(

@@ -18,7 +18,7 @@ from acquisition.benchmark.number_text import rounded
 from acquisition.benchmark.studies.method import rms_and_median
 from acquisition.benchmark.study import Study
 from acquisition.benchmark.trial import Trial, select
-from acquisition.measure.radiometry import rounding_u_dn
+from acquisition.measure.rounding import rounding_u_dn
 from instrument.config.camera import CameraConfig
 from instrument.geometry import FloatArray
 

@@ -7,12 +7,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy.special import ndtr
 
 from acquisition.measure.placement import Placement
-from acquisition.measure.radiometry import Dark, average_dark, measure, rounding_u_dn
+from acquisition.measure.radiometry import Dark, average_dark, measure
 from acquisition.measure.window import Window, window_at
 from instrument.config.load import load_rig
 from instrument.devices import Frame
@@ -71,27 +68,6 @@ def test_a_single_frame_takes_its_noise_from_the_photon_transfer_curve() -> None
     one = measure(_frames(1500, sd, 1), _dark(), _window(), CAMERA, ON_AXIS, 100)
     many = measure(_frames(1500, sd, 16), _dark(), _window(), CAMERA, ON_AXIS, 100)
     assert one.u_noise_dn == pytest.approx(4 * many.u_noise_dn, rel=0.1)
-
-
-@pytest.mark.parametrize("sd", [0.0, 0.1, 0.2, 0.3, 0.5])
-def test_the_rounding_error_is_that_of_the_fourier_series(sd: float) -> None:
-    """Compare with the mean of rounded normal noise, computed from its distribution."""
-    levels = np.arange(0.0005, 1, 0.001)
-    counts = np.arange(-9, 11)
-    edges = (np.append(counts - 0.5, counts[-1] + 0.5) - levels[:, None]) / max(sd, 1e-9)
-    mean = np.diff(ndtr(edges), axis=1) @ counts
-    error = mean - levels
-    assert rounding_u_dn(sd**2) == pytest.approx(np.sqrt(np.mean(error**2)), abs=2e-4)
-
-
-def test_without_noise_rounding_is_a_uniform_error() -> None:
-    assert rounding_u_dn(0.0) == pytest.approx(1 / np.sqrt(12), rel=2e-3)
-
-
-@given(st.floats(0, 1), st.floats(0, 1))
-def test_more_noise_means_less_rounding_error(a: float, b: float) -> None:
-    low, high = sorted((a, b))
-    assert rounding_u_dn(high) <= rounding_u_dn(low)
 
 
 def test_the_effect_of_a_misplaced_sample_follows_the_gradient_of_the_image() -> None:
