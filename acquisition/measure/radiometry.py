@@ -91,7 +91,7 @@ def measure(
     rounding, u_rounding = dark_rounding_dn(dark_mean, dark_variance, window.weights, dark.frames)
     u_dark_noise = _u_noise(window, dark_variance / dark.frames)
     u_placement, u_texture = placement_u_dn(frames, dark.mean, window, placement)
-    u_hot = hot_share * _spread(mean - dark.mean[window.crop], window)
+    u_hot = hot_share * _spread(mean - dark_mean, window)
     # A saturated pixel is short of its true count by up to full scale, or more.
     u_saturated = saturated_weight * (camera.max_dn - camera.black_level_dn)
     return Signal(
