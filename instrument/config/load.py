@@ -86,7 +86,7 @@ def _read(path: Path, role: type[Section]) -> _File:
     file = _File(path, read_yaml(yaml_bytes(path)))
     text = None if file.found else wrong_role(file.marked.data, role)
     if text is not None:
-        raise InputError(f"{file.name}: {text}")
+        raise InputError(f"{file.name}:1:1: {text}")
     return file
 
 

@@ -19,7 +19,8 @@ def yaml_bytes(path: Path) -> bytes:
         kind = foreign_kind(raw)
         if kind is None:
             return raw
-        problem = f"is {kind.name}; allowed: a YAML file; {_suggestion(path)}"
+        allowed = f"allowed: a YAML file; {_suggestion(path)}"
+        raise InputError(f"{printable(str(path))}:1:1: is {kind.name}; {allowed}")
     except FileNotFoundError:
         problem = f"no such file; {_suggestion(path)}"
     except IsADirectoryError:

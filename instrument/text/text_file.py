@@ -80,7 +80,9 @@ def read_text(path: Path, *, pipe: bool = False) -> TextFile:
     raw = _bytes(path, name, pipe).removeprefix(b"\xef\xbb\xbf")
     kind = foreign_kind(raw) or json_kind(raw)
     if kind is not None:
-        raise InputError(f"{name}: is {kind.name}; allowed: a table as text (CSV); {kind.advice}")
+        raise InputError(
+            f"{name}:1:1: is {kind.name}; allowed: a table as text (CSV); {kind.advice}"
+        )
     count = 1 + raw.count(b"\n") + raw.count(b"\r") - raw.count(b"\r\n")
     if count > MAX_LINES:
         raise InputError(f"{name}: {count} lines; allowed: {MAX_LINES}; split it")

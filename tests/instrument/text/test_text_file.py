@@ -42,7 +42,7 @@ def test_text_that_is_not_utf_8(mark: bytes, end: bytes) -> None:
 
 
 def test_a_table_in_utf_16_is_not_guessed() -> None:
-    assert problems(BARE.encode("utf-16"))[0].startswith("data.csv: is text in UTF-16; allowed")
+    assert problems(BARE.encode("utf-16"))[0].startswith("data.csv:1:1: is text in UTF-16; allowed")
 
 
 def test_a_file_that_cannot_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:

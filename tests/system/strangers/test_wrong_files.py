@@ -75,7 +75,7 @@ WRONG: dict[str, tuple[str, ...]] = {
     "report run/fit.json": ("is a file of a run; name the run's folder: run",),
     "resume paper.pdf": ("is a file; name the folder of a run",),
     "plan rig.yaml": ("is a rig file (keys beam_length_mm", "allowed: a protocol", "`rig: FILE`"),
-    "plan swapped.yaml": ("swapped.yaml:4:6: rig: protocol.yaml: is a protocol", "a rig file"),
+    "plan swapped.yaml": ("swapped.yaml:4:6: rig: protocol.yaml:1:1: is a protocol", "a rig file"),
     "plan protocol.yaml --rig protocol.yaml": ("is a protocol (keys rig, sample", "a rig file"),
     "devices --rig protocol.yaml": ("is a protocol (keys rig, sample", "allowed: a rig file"),
     "plan run/fit.json": ("is not a protocol (keys chosen, verdict", "allowed: a protocol"),
