@@ -8,6 +8,8 @@ from instrument.kinematics import Trapezoid
 
 STARTS_WITHIN_S = 0.5  # some controllers still report ready just after the command
 STALLED_S = 1.0  # reported as moving, but at the same position
+LONG_S = 1.0  # moves of this duration show whether the controller's speed is the rig file's
+TOO_FAST, TOO_SLOW = 0.9, 1.25  # of the duration that follows from speed and acceleration
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,13 +86,20 @@ class MoveMonitor(_Monitor):
         super().__init__(started_s)
         self._limits, self._target = limits, target
         way = Trapezoid(target - start, limits.speed_deg_per_s, limits.acceleration_deg_per_s2)
+        self.duration_s = way.duration_s
         self._allowed_s = 1.5 * way.duration_s + 2.0
+        self._moved_s = 0.0
         self._start = self._at = start
         self._at_s = started_s
 
-    def ended(self, now: Status) -> bool:
-        """True once the stage stands, unless the move has not begun yet."""
+    def ended(self, now: Status, time_s: float) -> bool:
+        """True once the stage stands, unless the move has not begun yet.
+
+        `time_s` is a time just before the status.
+        """
         self._begun |= now.moving or abs(now.position_deg - self._start) > self._step_deg
+        if now.moving:
+            self._moved_s = time_s - self._started_s
         off_deg = abs(now.position_deg - self._target)
         return not now.moving and (self._begun or off_deg <= self._limits.tolerance_deg)
 
@@ -107,6 +116,28 @@ class MoveMonitor(_Monitor):
         if since_s > self._allowed_s:
             return f"still {where} after {since_s:.1f} s (allowed: {self._allowed_s:.1f} s)"
         return ""
+
+    def speed_problem(self, arrived_s: float) -> str:
+        """Return a description of a speed that is not the rig file's, or an empty text.
+
+        `arrived_s` is a time of the clock after the status that reported rest: the move took no
+        longer than until then, and no less than until the last status that reported motion.
+        """
+        took_s, least_s = arrived_s - self._started_s, self._moved_s
+        if self._resent:
+            return ""
+        if took_s < TOO_FAST * self.duration_s:
+            took = f"{took_s:.2f} s, too fast"
+        elif least_s > TOO_SLOW * self.duration_s + STARTS_WITHIN_S:
+            took = f"{least_s:.2f} s, too slow"
+        else:
+            return ""
+        return (
+            f"moved from {self._start:g} to {self._target:g} deg in {took}: it takes "
+            f"{self.duration_s:.2f} s at the rig file's {self._limits.speed_deg_per_s:g} deg/s and "
+            f"{self._limits.acceleration_deg_per_s2:g} deg/s2. Look at the controller's units and "
+            "speed, then home it: homing sets the speed again"
+        )
 
     @property
     def _step_deg(self) -> float:

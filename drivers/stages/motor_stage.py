@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 from abc import ABC, abstractmethod
 
-from drivers.stages.motion import STALLED_S, HomingMonitor, Limits, MoveMonitor, Status
+from drivers.stages.motion import LONG_S, STALLED_S, HomingMonitor, Limits, MoveMonitor, Status
 from drivers.stages.watchdog import Watchdog
 from instrument.clock import Clock
 from instrument.closeable import Closeable
@@ -47,7 +47,7 @@ class MotorStage(ABC):
         self._target_deg: float | None = None
         self._from_deg = 0.0
         self._started_s = 0.0
-        self._stopped = False
+        self._stopped = self._speed_known = False
         self.watchdog = Watchdog(name, self._probe, self._stop_unwatched, clock, reply_s)
 
     # To be provided by a driver.
@@ -143,12 +143,16 @@ class MotorStage(ABC):
         now = self._status_before_motion()
         self._refuse_fault(now)
         if now.homed and self.KEEPS_REFERENCE:
-            self._apply_speed()
+            self._set_speed()
             self.start_move(self._limits.home_deg)
             self.wait()
             return
         self._find_reference(again=now.homed)
+        self._set_speed()
+
+    def _set_speed(self) -> None:
         self._apply_speed()
+        self._speed_known = False  # what is read back need not be what is done
 
     def _find_reference(self, again: bool) -> None:
         self._stopped, self._target_deg = False, None
@@ -212,7 +216,7 @@ class MotorStage(ABC):
     def _monitor_move(self, target_deg: float) -> float:
         monitor = MoveMonitor(self._limits, self._from_deg, target_deg, self._started_s)
         time_s = self._clock.now_s()
-        while not monitor.ended(now := self._poll()):
+        while not monitor.ended(now := self._poll(), time_s):
             self._refuse_lost_reference(now)
             if monitor.should_resend(time_s):
                 log.warning("%s: stands still: move to %g deg sent again", self.name, target_deg)
@@ -225,7 +229,18 @@ class MotorStage(ABC):
                 raise DeviceError(f"{self.name}: {problem}")
             self._clock.sleep(POLL_S)
             time_s = self._clock.now_s()  # before the status: it is then judged by no later time
-        return self._check_arrival(now)
+        arrived_deg = self._check_arrival(now)
+        self._check_speed(monitor)
+        return arrived_deg
+
+    def _check_speed(self, monitor: MoveMonitor) -> None:
+        """Compare the first long move since the speed was set with its duration."""
+        if self._speed_known or monitor.duration_s < LONG_S:
+            return
+        problem = monitor.speed_problem(self._clock.now_s())
+        if problem:
+            raise DeviceError(f"{self.name}: {problem}")
+        self._speed_known = True
 
     def close(self) -> None:
         """Release the line; safe to call twice."""

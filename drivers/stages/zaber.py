@@ -161,9 +161,11 @@ class ZaberStage(MotorStage):
 
     def _own_settings(self) -> dict[str, str]:
         rate = self._whole("maxspeed") / framing.SPEED_PER_MICROSTEP
+        ramp = self._whole("accel") / framing.ACCELERATION_PER_MICROSTEP
         by = " (set by this program)" if self._port.switched_on else ""
         return {
             "speed_deg_per_s": f"{rate / self._steps_per_deg:g}",
+            "acceleration_deg_per_s2": f"{ramp / self._steps_per_deg:g}",
             "comm.checksum": f"1{by}",
         }
 
@@ -171,15 +173,29 @@ class ZaberStage(MotorStage):
         self._send_motion("home")
 
     def _apply_speed(self) -> None:
-        rate = self._limits.speed_deg_per_s * self._steps_per_deg
-        wanted = round(rate * framing.SPEED_PER_MICROSTEP)
-        self._port.send(f"set maxspeed {wanted}")
-        got = self._whole("maxspeed")
-        if got != wanted:
+        speed, ramp = self._limits.speed_deg_per_s, self._limits.acceleration_deg_per_s2
+        self._set("maxspeed", speed, framing.SPEED_PER_MICROSTEP, "deg/s")
+        self._set("accel", ramp, framing.ACCELERATION_PER_MICROSTEP, "deg/s2")
+
+    def _set(self, setting: str, value: float, per_microstep: float, unit: str) -> None:
+        """Set a speed or an acceleration, never to a higher one than asked for; read it back."""
+        per_unit = self._steps_per_deg * per_microstep
+        data = int(value * per_unit * (1 + 1e-9))
+        advice = "put a value that the stage can do into the rig file"
+        if data < 1:
             raise DeviceError(
-                f"{self._who}: maxspeed is {got} after {wanted} was asked for "
-                f"({self._limits.speed_deg_per_s:g} deg/s): put a speed that the stage can do into "
-                "the rig file"
+                f"{self._who}: {setting} of {value:g} {unit} is less than the device's step of "
+                f"{1 / per_unit:g} {unit}: {advice}"
+            )
+        try:
+            self._port.send(f"set {setting} {data}")
+        except Refused as error:
+            raise DeviceError(f"{error} ({value:g} {unit}): {advice}") from error
+        got = self._whole(setting)
+        if got != data:
+            raise DeviceError(
+                f"{self._who}: {setting} is {got} after {data} was asked for ({value:g} {unit}): "
+                f"{advice}"
             )
 
     def _send_move(self, angle_deg: float) -> None:

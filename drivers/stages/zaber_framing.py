@@ -14,6 +14,9 @@ from dataclasses import dataclass
 END = b"\r\n"
 IDS = 100  # message ids run from 00 to 99
 SPEED_PER_MICROSTEP = 1.6384  # speed data for one microstep a second
+# Acceleration data for one microstep/s2; three independent public programs agree. 0 would mean that
+# there is no ramp at all.
+ACCELERATION_PER_MICROSTEP = 1.6384e-4
 
 # Faults, the warning flags that begin with F, from the maker's list, and what to look at.
 FAULTS = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from instrument.clock import Clock
 from instrument.kinematics import Trapezoid
@@ -79,6 +79,15 @@ class Motor:
             self._start_deg = self.position_deg
             self._move = self._trapezoid(angle_deg - self._start_deg)
             self._start_s = self._clock.now_s()
+
+    def set_speed(self, speed_deg_per_s: float, acceleration_deg_per_s2: float) -> None:
+        """Set speed and acceleration of later moves."""
+        with self._lock:
+            self.mechanics = replace(
+                self.mechanics,
+                speed_deg_per_s=speed_deg_per_s,
+                acceleration_deg_per_s2=acceleration_deg_per_s2,
+            )
 
     def end_move(self) -> None:
         """Complete the move at once."""

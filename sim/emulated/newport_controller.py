@@ -112,6 +112,7 @@ class NewportController:
         if number is None or number <= 0:
             return "C"
         self.values[letters] = number
+        self.motor.set_speed(self.values["VA"], self.values["AC"])
         return "@"
 
     def _take_error(self) -> str:

@@ -2,6 +2,12 @@
 
 Framing and registers are written a second time here, from the maker's manual and the Modbus
 specification, and share no code with the driver, so that an error in one is caught by the other.
+
+Transcripts: the maker's own example of a direct data operation, byte for byte; the CRC of the
+Modbus specification; independent masters and slaves in the tests. Not verified on a drive: the
+factory settings of the direct data, which requests it refuses with which exception, the time of an
+answer (here none), and READY, MOVE and IN-POS between a trigger and the first step. Acceleration
+and deceleration are one here.
 """
 
 from __future__ import annotations
@@ -23,6 +29,8 @@ _READABLE = {_OUTPUT, _OUTPUT + 1, _ALARM, _ALARM + 1} | {
 }
 _ZHOME, _STOP, _FREE, _ALM_RST = 4, 5, 6, 7
 _HOME_END, _READY, _ALM, _MOVE, _IN_POS = 4, 5, 7, 13, 14
+# Of the direct data: type, speed in Hz, acceleration and deceleration in 0.001 kHz/s, current.
+_FACTORY = {2: 2, 6: 1000, 8: 1_000_000, 10: 1_000_000, 12: 1000}
 _KINDS = (1, 2, 3)  # absolute, incremental on the command, incremental on the feedback
 _BAD_FUNCTION, _BAD_ADDRESS, _BAD_VALUE = 1, 2, 3
 
@@ -53,10 +61,8 @@ class OrientalController:
         self.triggers = self.homings = 0
         self._now_s = now_s
         self._set = dict.fromkeys(_SETTABLE, 0)
-        self._set[_DIRECT + 3], self._set[_DIRECT + 13] = (
-            2,
-            1000,
-        )  # factory settings: operation type, current
+        for offset, value in _FACTORY.items():
+            self._set |= _pair(_DIRECT + offset, value)
         self._command_steps = self._feedback()
         self._frame, self._last_s = b"", now_s()
         self._coasting = False
@@ -143,8 +149,10 @@ class OrientalController:
         if not written.keys() <= _SETTABLE:
             raise ModbusException(_BAD_ADDRESS)
         before, after = self._set, self._set | written
-        kind = _signed(after, _DIRECT + 2)
+        kind, speed, ramp = (_signed(after, _DIRECT + offset) for offset in (2, 6, 8))
         if kind not in _KINDS or not 0 <= _signed(after, _DIRECT + 12) <= 1000:
+            raise ModbusException(_BAD_VALUE)
+        if speed == 0 or ramp < 1:
             raise ModbusException(_BAD_VALUE)
         self._set = after
         self._act_on_inputs(before[_INPUT + 1], after[_INPUT + 1])
@@ -176,6 +184,8 @@ class OrientalController:
             return
         self._command_steps = steps
         self._progress_deg, self._progress_s = float("nan"), self._now_s()
+        speed, acceleration = (_signed(self._set, _DIRECT + offset) for offset in (6, 8))
+        self.motor.set_speed(speed / self.steps_per_deg, acceleration / self.steps_per_deg)
         self.motor.move(angle_deg)
 
     def _detect_overload(self) -> None:

@@ -1,10 +1,11 @@
 """Emulated Zaber rotary stage (ASCII protocol): replies, checksums and warning flags.
 
 Transcripts: replies have the form that the tests of the maker's MATLAB toolbox quote from devices
-(`@01 0 OK IDLE -- 50001`), and the maker's library zaber-motion drives this stage in the tests. A
-reply carries a checksum if the setting comm.checksum is 1, and not because the command had one: the
-maker's libraries read both forms, and public programs set it. Not verified on a device: that last
-rule, the value of deviceid (59999 is of no real device), and the time of a reply (here none).
+(`@01 0 OK IDLE -- 50001`); NI after a move that was stopped is from the example of the public
+library zproto; the maker's library zaber-motion drives this stage in the tests. A reply carries a
+checksum if the setting comm.checksum is 1, and not because the command had one: the maker's
+libraries read both forms, and public programs set it. Not verified on a device: that last rule, the
+value of deviceid (59999 is of no real device), and the time of a reply (here none).
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from sim.emulated.motor import Motor
 
 MICROSTEPS_PER_DEG = 1_536_000 / 360  # X-RSW60
 _SPEED_PER_MICROSTEP = 1.6384
-_SETTABLE = {"maxspeed": range(1, 1 << 31), "comm.checksum": range(2)}
+_ACCELERATION_PER_MICROSTEP = 1.6384e-4
+_SETTABLE = {"maxspeed": range(1, 1 << 31), "accel": range(1, 32768), "comm.checksum": range(2)}
 _COMMAND = re.compile(r"/(\d+)?(?: (\d+))?(?: (\d\d))?(?: ([a-z].*))?")
 
 
@@ -30,9 +32,12 @@ class ZaberController:
     ) -> None:
         self.motor, self.device, self._per_deg = motor, device, microsteps_per_deg
         self._buffer = b""
+        self._interrupted = False
         self.moves = 0
         low, high = motor.mechanics.min_deg, motor.mechanics.max_deg
         speed = motor.mechanics.speed_deg_per_s * self._per_deg * _SPEED_PER_MICROSTEP
+        acceleration = motor.mechanics.acceleration_deg_per_s2 * self._per_deg
+        acceleration *= _ACCELERATION_PER_MICROSTEP
         self.settings: dict[str, int | str] = {
             "deviceid": 59999,  # of no real device
             "system.serial": 75001,
@@ -48,6 +53,7 @@ class ZaberController:
             "limit.min": round(low * self._per_deg),
             "limit.max": round(high * self._per_deg),
             "maxspeed": round(speed),
+            "accel": round(acceleration),
         }
 
     def answer(self, data: bytes) -> bytes:
@@ -80,6 +86,7 @@ class ZaberController:
         if command == "":
             return "OK", "0"
         if command == "stop":
+            self._interrupted |= self.motor.moving
             self.motor.stop()
             return "OK", "0"
         if command == "warnings":
@@ -102,6 +109,10 @@ class ZaberController:
         if not value.isdigit() or int(value) not in _SETTABLE[setting]:
             return "RJ", "BADDATA"
         self.settings[setting] = int(value)
+        self.motor.set_speed(
+            int(self.settings["maxspeed"]) / _SPEED_PER_MICROSTEP / self._per_deg,
+            int(self.settings["accel"]) / _ACCELERATION_PER_MICROSTEP / self._per_deg,
+        )
         return "OK", "0"
 
     def _move(self, rest: str) -> tuple[str, str]:
@@ -116,18 +127,21 @@ class ZaberController:
         if not low <= int(value) <= high:
             return "RJ", "BADDATA"
         self.moves += 1
+        self._interrupted = False
         self.motor.move(int(value) / self._per_deg)
         return "OK", "0"
 
     def _home(self, _: str) -> tuple[str, str]:
         if self.motor.alarm:
             return "RJ", "DRIVERDISABLED"
+        self._interrupted = False
         self.motor.home()
         return "OK", "0"
 
     def _warnings(self) -> list[str]:
         flags = [self.motor.alarm] if self.motor.alarm else []
-        return flags if self.motor.referenced else [*flags, "WH"]
+        flags += [] if self.motor.referenced else ["WH"]
+        return [*flags, "NI"] if self._interrupted else flags
 
 
 def _checksum(body: str) -> int:

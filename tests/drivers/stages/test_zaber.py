@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from drivers.lines.serial_line import Garbled, Line
@@ -12,6 +14,8 @@ from sim.emulated.motor import Motor
 from sim.emulated.wire import PtyWire
 from sim.emulated.zaber_controller import MICROSTEPS_PER_DEG, ZaberController
 from tests.support.stages.emulated_stages import LIMITS, SLOW
+from tests.support.stages.memory_stages import LIMITS as MEMORY_LIMITS
+from tests.support.stages.memory_stages import in_memory
 
 pytestmark = pytest.mark.waits
 
@@ -79,3 +83,33 @@ def test_a_device_that_cannot_send_checksums_is_refused_and_says_what_to_do() ->
     refused = pytest.raises(DeviceError, match=r"BADCOMMAND.*no checksum.*set comm.checksum to 1")
     with PtyWire([controller]) as wire, refused:
         opened(controller, wire)
+
+
+@pytest.mark.parametrize(
+    ("key", "says"),
+    [
+        ("speed_deg_per_s", "maxspeed of 1e-05 deg/s is less than the device's step of 0.000143"),
+        ("acceleration_deg_per_s2", "accel of 1e-05 deg/s2 is less than the device's step of 1.43"),
+    ],
+)
+def test_a_speed_below_the_devices_step_is_refused(
+    key: str, says: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An acceleration of 0 would mean no ramp at all."""
+    stage = in_memory("zaber", monkeypatch, limits=replace(MEMORY_LIMITS, **{key: 1e-5})).open()
+    with pytest.raises(DeviceError, match=says):
+        stage.home()
+
+
+def test_a_stopped_move_is_flagged_and_no_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    slow = replace(MEMORY_LIMITS, speed_deg_per_s=10.0, acceleration_deg_per_s2=100.0)
+    found = in_memory("zaber", monkeypatch, limits=slow)
+    stage = found.open()
+    stage.home()
+    stage.start_move(60.0)
+    found.clock.sleep(1.0)
+    stage.stop()
+    assert stage.homed()
+    assert any(b" NI " in reply for reply in found.wire.genuine)
+    stage.start_move(0.0)
+    assert stage.wait() == pytest.approx(0.0, abs=1e-3)
