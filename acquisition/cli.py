@@ -8,10 +8,11 @@ from __future__ import annotations
 import gc
 import math
 import os
+import platform
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -47,12 +48,26 @@ class _Commands(TyperGroup):
 
 app = typer.Typer(
     cls=_Commands,
-    help="Measure how a flat sample reflects light, and find the simplest model that explains it.",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+_AXES = ("theta_i", "dphi", "theta_r")
+
+
+def _among(words: Sequence[str]) -> Callable[[str], list[str]]:
+    """Completion in the shell among a few words."""
+    return lambda incomplete: [word for word in words if word.startswith(incomplete)]
+
+
+def _model_names(incomplete: str) -> list[str]:
+    """Completion in the shell of names of models, separated by commas."""
+    from acquisition.commands.models import completed_names
+
+    return completed_names(incomplete)
+
 
 ProtocolFile = Annotated[Path, typer.Argument(help="The protocol, a YAML file.")]
 RigFile = Annotated[
@@ -71,7 +86,31 @@ Json = Annotated[
 
 RigOnly = Annotated[Path | None, typer.Option("--rig", help="The rig file.")]
 Yes = Annotated[bool, typer.Option("--yes", help="The rig is clear and may move: do not ask.")]
-AxisName = Annotated[str, typer.Argument(help="theta_i, dphi or theta_r.")]
+AxisName = Annotated[
+    str,
+    typer.Argument(help="theta_i, dphi or theta_r.", autocompletion=_among(_AXES)),
+]
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from acquisition.results.versions import versions_of
+
+        number = versions_of("gonio")["gonio"]
+        typer.echo(f"gonio {number} (Python {platform.python_version()})")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
+        ),
+    ] = False,
+) -> None:
+    """Measure how a flat sample reflects light, and find the simplest model that explains it."""
 
 
 @app.command()
@@ -107,14 +146,19 @@ def fit(
         str | None,
         typer.Option(
             help="Candidate models, separated by commas. Default: those of a run's protocol, else "
-            "the whole ladder."
+            "the whole ladder.",
+            autocompletion=_model_names,
         ),
     ] = None,
     max_theta_deg: Annotated[
         float, typer.Option(help="Leave out points with a larger theta_i or theta_r (degrees).")
     ] = 90.0,
     format: Annotated[
-        str, typer.Option(help="run, csv or curet; auto: a run if SOURCE is a folder, else csv.")
+        str,
+        typer.Option(
+            help="run, csv or curet; auto: a run if SOURCE is a folder, else csv.",
+            autocompletion=_among(("auto", "run", "csv", "curet")),
+        ),
     ] = "auto",
     sample: Annotated[int | None, typer.Option(help="Number of the material, for curet.")] = None,
     robust: Annotated[
@@ -138,7 +182,10 @@ def fit(
     ] = None,
     method: Annotated[
         str,
-        typer.Option(help="Method for rough surfaces: auto, qualitative, functional or exact."),
+        typer.Option(
+            help="Method for rough surfaces: auto, qualitative, functional or exact.",
+            autocompletion=_among(("auto", "qualitative", "functional", "exact")),
+        ),
     ] = "auto",
     json: Json = False,
 ) -> None:
@@ -160,6 +207,22 @@ def fit(
         repeats=repeats,
     )
     fit_source(source, wanted, models=models, robust=robust, method=method, as_json=json)
+
+
+@app.command()
+def models(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Models or sums of them. Default: all single ones.", autocompletion=_model_names
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """List the reflectance models with their parameters, and the candidates of a fit."""
+    from acquisition.commands.models import list_models
+
+    list_models(names or [], as_json=json)
 
 
 @app.command()

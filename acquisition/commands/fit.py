@@ -13,6 +13,7 @@ from acquisition.results.sources import Source, Wanted, read_source
 from acquisition.results.summary import VERDICTS, paper_ratio_note, parameters_of
 from acquisition.terminal.console import out, print_lines, print_notes, print_text
 from acquisition.terminal.layout import table_lines, wrapped
+from acquisition.terminal.progress import sign_of_life
 from analysis.choice.choice import Choice, choose
 from analysis.choice.fit_json import to_json
 from analysis.choice.ladder import METHODS, MethodOfFit
@@ -35,7 +36,7 @@ def fit_source(
     `fit_status.require_result` does.
     """
     names, way = _names(models), _method(method, models)
-    with no_fit_reported(path, as_json):
+    with no_fit_reported(path, as_json), sign_of_life("fit"):
         source = read_source(path, wanted)
         if names is None and way == "auto":
             names, way = source.fit.models, source.fit.method

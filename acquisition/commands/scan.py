@@ -26,6 +26,7 @@ from acquisition.results.run_folder import (
 )
 from acquisition.rig import check_ready
 from acquisition.terminal.operator import require_yes
+from acquisition.terminal.progress import sign_of_life
 from instrument.config.load import Loaded, load_protocol
 from instrument.errors import OperatorStop
 from instrument.record.event_kinds import FAULT, RESUMED, STOPPED
@@ -110,7 +111,7 @@ def _finish(record: Record, loaded: Loaded, as_json: bool) -> None:
     try:
         from acquisition.results.finish import finish  # heavy: only after a scan
 
-        with no_fit_reported(record.folder, as_json):
+        with no_fit_reported(record.folder, as_json), sign_of_life("fit and report"):
             outcome = finish(record, loaded)
     except KeyboardInterrupt:
         raise OperatorStop(

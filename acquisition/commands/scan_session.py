@@ -9,7 +9,8 @@ from acquisition.engine.event_log import EventLogHandler, log_to_record
 from acquisition.engine.resume import Progress
 from acquisition.plan.plan import Plan, Step
 from acquisition.rig import open_devices
-from acquisition.terminal.console import console, duration_text, progress_bar, warnings_shown
+from acquisition.terminal.console import console, duration_text, warnings_shown
+from acquisition.terminal.progress import scan_progress
 from instrument.clock import Clock, SystemClock
 from instrument.config.load import Loaded
 from instrument.errors import DeviceError, OperatorStop, StorageError
@@ -57,7 +58,7 @@ def _run(
         highlight=False,
         soft_wrap=True,
     )
-    with progress_bar(plan, before.done) as show:
+    with scan_progress(plan, before.done) as show:
 
         def on_step(step: Step) -> None:
             log.write()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -57,3 +58,33 @@ def test_no_module_is_imported_from_the_working_folder(
         cwd=tmp_path, capture_output=True, text=True, check=False, timeout=DEADLINE_S,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+
+
+def test_version_and_both_forms_of_help_are_known() -> None:
+    shown = gonio("--version")
+    assert (shown.returncode, shown.stdout.split()[:2]) == (0, ["gonio", version("gonio")])
+    for command in ((), ("fit",), ("move",)):
+        short, long = gonio(*command, "-h"), gonio(*command, "--help")
+        assert short.returncode == long.returncode == 0
+        assert short.stdout == long.stdout
+        assert "-h, --help" in long.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "completed"),
+    [
+        ("gonio re", ["report", "resume"]),
+        ("gonio home th", ["theta_i", "theta_r"]),
+        ("gonio fit x.csv --method e", ["exact"]),
+        ("gonio fit x.csv --models lambert,minn", ["lambert,minnaert"]),
+    ],
+)
+def test_the_shell_completes_commands_and_words(
+    words: str, completed: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As bash asks, by the script that `gonio --show-completion bash` prints."""
+    monkeypatch.setenv("_GONIO_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
+    found = gonio().stdout.split()
+    assert [word for word in sorted(found) if "+" not in word] == completed

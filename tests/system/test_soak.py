@@ -123,7 +123,7 @@ def soaked(azimuths: int) -> Iterator[Soaked]:
     """Scan as `gonio run` does, with progress display and log."""
     loaded = soak_scan(azimuths)
     plan, watch = make_plan(loaded), Watch(reference_image(loaded))
-    show = acquisition.commands.scan_session.progress_bar
+    show = acquisition.commands.scan_session.scan_progress
 
     @contextmanager
     def watched(plan: Plan, done: frozenset[int]) -> Iterator[Callable[[Step], None]]:
@@ -140,7 +140,7 @@ def soaked(azimuths: int) -> Iterator[Soaked]:
         pytest.MonkeyPatch.context() as patch,
         Record.create(Path(folder) / "run", {}) as record,
     ):
-        patch.setattr(acquisition.commands.scan_session, "progress_bar", watched)
+        patch.setattr(acquisition.commands.scan_session, "scan_progress", watched)
         acquisition.commands.scan_session.scan(loaded, plan, record)
         yield Soaked(loaded, plan, record, watch)
 
