@@ -72,8 +72,7 @@ def test_a_narrow_terminal_wraps_names_and_cuts_no_number(
     wide, narrow = candidates(200), candidates(50)
     assert re.findall(number, narrow) == re.findall(number, wide)
     assert "…" not in narrow
-    assert "lambert+torrance_sparrow" in wide
-    assert "lambert+torrance_sparrow" not in narrow
+    assert max(map(len, narrow.splitlines())) <= 50 < max(map(len, wide.splitlines()))
 
 
 def test_the_rough_surface_is_worked_out_as_asked(rough: Path) -> None:
