@@ -287,12 +287,12 @@ def grab(
         float, typer.Option(help="View angle of the camera in degrees, for the outline.")
     ] = 0.0,
     exposure_s: Annotated[
-        float | None, typer.Option(help="Exposure in seconds. Default: the camera's shortest.")
+        float | None, typer.Option(help="Exposure in seconds. Default: one that suits the window.")
     ] = None,
     json: Json = False,
 ) -> None:
     """Take one frame with the measuring window drawn on it, for aiming. Nothing moves."""
-    from acquisition.commands.setup import grab_frame
+    from acquisition.commands.grab import grab_frame
 
     grab_frame(out, rig, protocol, theta_r_deg=theta_r_deg, exposure_s=exposure_s, as_json=json)
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from acquisition.engine.exposure_check import ExposureCheck
+from acquisition.engine.exposure_search import ExposureSearch
 from acquisition.engine.retrying_camera import RetryingCamera
 from acquisition.measure.hot_pixels import hot_pixel_text
 from acquisition.measure.linearity import require_possible_times
-from acquisition.measure.radiometry import SATURATION_FRACTION, Dark, average_dark, bright_level
+from acquisition.measure.radiometry import Dark, average_dark
 from acquisition.measure.window import Window
-from acquisition.plan.exposure_ladder import longest_exposure_s
 from acquisition.plan.plan import Step
 from instrument.clock import Clock
 from instrument.config.protocol import Protocol
@@ -24,8 +24,6 @@ from instrument.errors import DeviceError
 from instrument.record.event_kinds import HOT, OPERATOR
 from instrument.record.reading import Reading
 from instrument.record.record import Record
-
-MAX_EXPOSURES_TRIED = 8  # spans the ladder of any camera in factors of four
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,12 +57,14 @@ class Exposer:
     record: Record
     _check: ExposureCheck = field(init=False)
     _start_s: float = field(default=0.0, init=False)
-    _taken_s: dict[float, float] = field(default_factory=dict, init=False)  # by what was asked for
+    _search: ExposureSearch = field(init=False)
     _darks: dict[float, Dark] = field(default_factory=dict, init=False)
     _used_before: frozenset[float] = field(default=frozenset(), init=False)
     _last: dict[Surface, Reading] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
+        target = self.protocol.exposure_target
+        self._search = ExposureSearch(self.camera, self.rig.camera, target)
         self._check = ExposureCheck(self.rig.camera, self.clock, self._connected_s, self.record)
 
     def restore(self, readings: Sequence[Reading]) -> None:
@@ -84,7 +84,9 @@ class Exposer:
 
     def expose(self, step: Step, window: Window) -> Exposed:
         """Take all frames of a step, unsaturated if the camera's exposure range allows it."""
-        *tried, first = self._search(step, window)
+        guess_s = self._first_guess_s(step)
+        tried = self._comparison(guess_s) + self._search.frames(guess_s, window)
+        first = tried.pop()
         frames, first_s = [first], self.scan_s()
         if step.frames > 1:
             frames += self.camera.grab(step.frames - 1)
@@ -106,71 +108,36 @@ class Exposer:
         """Return the time without that spent on waiting for a lost camera."""
         return self.clock.now_s() - self.camera.waited_s
 
-    def _search(self, step: Step, window: Window) -> list[Frame]:
-        """Try exposures until the brightest part of the window is within the target.
-
-        Returns one frame of each exposure, the chosen one last, a frame for the check first.
-        """
-        exposure_s = self._first_guess_s(step)
-        frames, tried = self._comparison(exposure_s), list[float]()
-        while True:
-            tried.append(exposure_s)
-            self._set(exposure_s)
-            frames.append(self.camera.grab(1)[0])
-            exposure_s = self._suitable_s(frames[-1], window)
-            if exposure_s in tried or len(tried) == MAX_EXPOSURES_TRIED:
-                return frames
-
     def _comparison(self, exposure_s: float) -> list[Frame]:
         """Take a frame of a shorter exposure, if the given one is to be checked."""
-        shorter_s = self._check.comparison_s(self._taken_s.get(exposure_s, exposure_s))
+        shorter_s = self._check.comparison_s(self._search.taken_s.get(exposure_s, exposure_s))
         if shorter_s is None:
             return []
         with self._check.timed():
-            self._set(shorter_s)
+            self._search.set(shorter_s)
             return self.camera.grab(1)
-
-    def _set(self, exposure_s: float) -> None:
-        """Set an exposure and note the one that the camera confirms."""
-        self._taken_s[exposure_s] = self.camera.set_exposure_s(exposure_s)
 
     def _first_guess_s(self, step: Step) -> float:
         """Return the exposure that suits the surface's last reading, or else the planned one."""
         last = self._last.get(step.surface)
         if last is None or math.isnan(last.peak_dn):
             return step.expected_exposure_s
-        return self._exposure_s(last.peak_dn, last.exposure_s)
-
-    def _suitable_s(self, frame: Frame, window: Window) -> float:
-        """Return the exposure that suits the brightness of a frame."""
-        counted = frame.image[window.crop][window.counted]
-        if not counted.size:
-            return frame.exposure_s
-        camera, peak = self.rig.camera, bright_level(counted)
-        if peak >= SATURATION_FRACTION * camera.max_dn:  # the true brightness is unknown
-            return longest_exposure_s(frame.exposure_s / 4, camera, self._taken_s)
-        return self._exposure_s(peak, frame.exposure_s)
-
-    def _exposure_s(self, peak_dn: float, exposure_s: float) -> float:
-        """Return the exposure within the target, given the peak level seen at another exposure."""
-        camera = self.rig.camera
-        rate_dn_per_s = max(peak_dn - camera.black_level_dn, 0.5) / exposure_s
-        target = self.protocol.exposure_target * (camera.max_dn - camera.black_level_dn)
-        return longest_exposure_s(target / rate_dn_per_s, camera, self._taken_s)
+        return self._search.exposure_s(last.peak_dn, last.exposure_s)
 
     def _dark(self, exposure_s: float) -> Dark:
         """Return the dark of an exposure; the scan time excludes darks repeated by a resume."""
         if exposure_s not in self._darks:
             begun_s = self._connected_s()
-            asked_s = next((a for a, t in self._taken_s.items() if t == exposure_s), exposure_s)
+            asked_s = self._search.asked_s(exposure_s)
             self.take_darks((asked_s,))
             if exposure_s in self._used_before:
                 self._start_s += self._connected_s() - begun_s
         if exposure_s not in self._darks:
+            now_s = self._search.taken_s[asked_s]
             raise DeviceError(
-                f"camera: {exposure_s:g} s cannot be set a second time: it now takes "
-                f"{self._taken_s[asked_s]:g} s where {asked_s:g} s is asked for; name exposures in "
-                "the rig file (min_exposure_s) that it keeps"
+                f"camera: {exposure_s:g} s cannot be set a second time: it now takes {now_s:g} s "
+                f"where {asked_s:g} s is asked for; name exposures in the rig file "
+                "(min_exposure_s) that it keeps"
             )
         return self._darks[exposure_s]
 
@@ -181,7 +148,7 @@ class Exposer:
         self.lamp.darken()
         self._note_cover("lamp covered for the darks")
         for exposure_s in exposures_s:
-            self._set(exposure_s)
+            self._search.set(exposure_s)
             frames = self.camera.grab(self.protocol.dark_frames)
             require_possible_times(frames)
             dark = average_dark(frames, self.rig.camera)
