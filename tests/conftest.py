@@ -32,10 +32,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="run the long proofs whole")
     real = parser.getgroup("real devices", "tests marked hil")
     real.addoption("--allow-motion", action="store_true", help="the rig is clear: stages may move")
-    real.addoption("--stage-port", help="of a real stage: /dev/serial/by-id/..., tcp://host:port")
-    real.addoption("--stage-driver", default="newport", choices=["newport", "oriental", "zaber"])
-    real.addoption("--stage-scale", type=float, default=1000.0, help="steps a degree")
     real.addoption("--rig", type=Path, help="the rig file that names the real devices")
+    real.addoption("--axis", action="append", help="an axis of it to move; default: all motors")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

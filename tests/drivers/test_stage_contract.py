@@ -1,145 +1,187 @@
-"""Contract of every stage: simulated, each driver on its emulated controller, and a real one.
+"""Contract of every stage: simulated, each driver on its emulated controller, and real ones.
 
-A real stage is tested only with `--allow-motion --stage-port PORT`; it then moves within 10 degrees
-of home.
+Real stages are tested only with `--allow-motion --rig FILE`: every motor of the rig file, or those
+that `--axis NAME` names, by their own settings. Each homes, and moves within 10 degrees of home, at
+the rig file's speed. Keep-out zones are not checked: the other axes are not read.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import pytest
 
 from drivers.factory import Lines, open_stage
+from drivers.lines.serial_line import PortGone
 from instrument.clock import SystemClock
-from instrument.config.axes import NewportAxis, OrientalAxis, SimulatedAxis, Wired, ZaberAxis
-from instrument.config.load import load_protocol
+from instrument.config.axes import AXES, SimulatedAxis, Wired
+from instrument.config.load import load_protocol, load_rig
 from instrument.devices import Stage
 from instrument.errors import DeviceError
 from sim.clock import SimulatedClock
 from sim.scene.scene import Scene
 from sim.scene.stage import SimulatedStage
 from tests.support.paths import CONFIGS
-from tests.support.stages.emulated_stages import EMULATED_STAGES
+from tests.support.stages.emulated_stages import EMULATED_STAGES, LIMITS
 
 pytestmark = pytest.mark.waits
 
-TOLERANCE_DEG = 0.05  # of a real stage
-KEYS = {
-    "min_deg": -10.0, "max_deg": 10.0, "u_deg": 0.01, "speed_deg_per_s": 5.0,
-    "acceleration_deg_per_s2": 5.0, "settle_s": 0.0, "homing_s": 120.0,
-}  # fmt: skip
+REACH_DEG = 10.0  # how far from home a real stage is moved
+
+
+@dataclass(frozen=True)
+class StageUnderTest:
+    """A stage, where its home is, and how far from its target it may stop."""
+
+    stage: Stage
+    home_deg: float
+    tolerance_deg: float
+
+    def at(self, share: float) -> float:
+        """Return an angle at a share of the reach on the side of home that has more room."""
+        low, high = self.stage.limits_deg()
+        up = high - self.home_deg >= self.home_deg - low
+        room_deg = high - self.home_deg if up else self.home_deg - low
+        return self.home_deg + share * min(REACH_DEG, room_deg) * (1 if up else -1)
+
+    def homed(self) -> Stage:
+        self.stage.home()
+        return self.stage
+
+    def near(self, angle_deg: float) -> object:
+        return pytest.approx(angle_deg, abs=self.tolerance_deg)
 
 
 @contextmanager
-def simulated() -> Iterator[Stage]:
+def simulated() -> Iterator[StageUnderTest]:
     loaded = load_protocol(CONFIGS / "protocols" / "demo.yaml")
     axis = loaded.rig.axes.theta_r
     assert isinstance(axis, SimulatedAxis)
     scene = Scene.of(loaded.rig, loaded.protocol)
-    yield SimulatedStage("theta_r", axis, scene, SimulatedClock())
+    stage = SimulatedStage("theta_r", axis, scene, SimulatedClock())
+    yield StageUnderTest(stage, axis.to_device_deg(axis.home_deg), 0.05)  # it has errors of its own
 
 
 @contextmanager
-def real(config: pytest.Config) -> Iterator[Stage]:
-    """The stage at `--stage-port`."""
-    port, scale = config.getoption("--stage-port"), config.getoption("--stage-scale")
-    axis: Wired
-    match config.getoption("--stage-driver"):
-        case "newport":
-            axis = NewportAxis(driver="newport", port=port, **KEYS)
-        case "zaber":
-            axis = ZaberAxis(driver="zaber", port=port, microsteps_per_deg=scale, **KEYS)
-        case "oriental":
-            axis = OrientalAxis(driver="oriental", port=port, steps_per_deg=scale, **KEYS)
-        case other:
-            pytest.fail(f"--stage-driver {other}: no such driver")
+def real(name: str, config: pytest.Config) -> Iterator[StageUnderTest]:
+    """An axis of the rig file, opened as a scan opens it."""
+    axis = load_rig(config.getoption("--rig")).axes[name]
+    assert isinstance(axis, Wired)
     with Lines(SystemClock()) as lines:
-        stage = open_stage("stage", axis, port, lines)
+        stage = open_stage(name, axis, axis.port, lines)
         try:
-            yield stage
+            yield StageUnderTest(stage, axis.to_device_deg(axis.home_deg), axis.tolerance_deg)
         finally:
-            stage.stop()
+            try:
+                stage.stop()
+            except PortGone as gone:
+                if "it was closed" not in str(gone):  # by the test itself
+                    raise
 
 
-@pytest.fixture(params=["simulated", *EMULATED_STAGES, pytest.param("real", marks=pytest.mark.hil)])
-def stage(request: pytest.FixtureRequest) -> Iterator[Stage]:
+def real_axes(config: pytest.Config) -> list[str]:
+    """Motors of the rig file, or those of them that `--axis` names."""
+    path, wanted = config.getoption("--rig"), config.getoption("--axis")
+    if path is None:
+        return []
+    axes = load_rig(path).axes
+    motors = [n for n in AXES if isinstance(axis := axes[n], Wired) and axis.port != "emulated"]
+    if unknown := set(wanted or ()) - set(motors):
+        raise pytest.UsageError(f"--axis {' '.join(unknown)}: {path} has the motors {motors}")
+    return wanted or motors
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Add the real axes that the options name."""
+    named = [f"real {name}" for name in real_axes(metafunc.config)] or ["no real stage"]
+    stages = [
+        "simulated",
+        *EMULATED_STAGES,
+        *(pytest.param(n, marks=pytest.mark.hil) for n in named),
+    ]
+    metafunc.parametrize("tested", stages, indirect=True)
+
+
+@pytest.fixture
+def tested(request: pytest.FixtureRequest) -> Iterator[StageUnderTest]:
     if request.param == "simulated":
-        with simulated() as stage:
-            yield stage
-    elif request.param == "real":
-        if not request.config.getoption("--stage-port"):
-            pytest.skip("no real stage: --allow-motion --stage-port PORT")
-        with real(request.config) as stage:
-            yield stage
+        with simulated() as tested:
+            yield tested
+    elif request.param == "no real stage":
+        pytest.skip("no real stage: --allow-motion --rig FILE, with a motor in it")
+    elif request.param.startswith("real "):
+        with real(request.param.removeprefix("real "), request.config) as tested:
+            yield tested
     else:
         with EMULATED_STAGES[request.param]() as emulated:
-            yield emulated.stage
+            yield StageUnderTest(emulated.stage, LIMITS.home_deg, LIMITS.tolerance_deg)
 
 
-def test_identity_is_stable(stage: Stage) -> None:
-    assert len(stage.identity()) > 10
-    assert stage.identity() == stage.identity()
+def test_identity_is_stable(tested: StageUnderTest) -> None:
+    assert len(tested.stage.identity()) > 10
+    assert tested.stage.identity() == tested.stage.identity()
 
 
-def test_limits_are_in_order(stage: Stage) -> None:
+def test_limits_are_in_order(tested: StageUnderTest) -> None:
+    low, high = tested.stage.limits_deg()
+    assert low < high
+    assert low <= tested.home_deg <= high
+
+
+def test_homing_ends_at_home(tested: StageUnderTest) -> None:
+    assert tested.homed().position_deg() == tested.near(tested.home_deg)
+
+
+def test_moves_end_at_their_targets(tested: StageUnderTest) -> None:
+    stage = tested.homed()
     low, high = stage.limits_deg()
-    assert low < 0 < high
-
-
-def test_homing_ends_at_home(stage: Stage) -> None:
-    stage.home()
-    assert stage.position_deg() == pytest.approx(0.0, abs=TOLERANCE_DEG)
-
-
-def test_moves_end_at_their_targets(stage: Stage) -> None:
-    stage.home()
-    for angle_deg in (2.0, -3.0, -3.0, 9.5, 9.51, 0.0):
+    for share in (0.2, -0.3, -0.3, 0.95, 0.951, 0.0):
+        angle_deg = min(max(tested.at(share), low), high)
         stage.start_move(angle_deg)
-        assert stage.wait() == pytest.approx(angle_deg, abs=TOLERANCE_DEG)
-        assert stage.position_deg() == pytest.approx(angle_deg, abs=TOLERANCE_DEG)
+        assert stage.wait() == tested.near(angle_deg)
+        assert stage.position_deg() == tested.near(angle_deg)
 
 
-def test_a_move_past_a_limit_is_refused(stage: Stage) -> None:
-    stage.home()
+def test_a_move_past_a_limit_is_refused(tested: StageUnderTest) -> None:
+    stage = tested.homed()
     low, high = stage.limits_deg()
     here = stage.position_deg()
     for angle_deg in (low - 0.01, high + 0.01, 1e6, float("nan")):
         with pytest.raises(DeviceError, match=r"asked for; its limits are"):
             stage.start_move(angle_deg)
-    assert stage.position_deg() == pytest.approx(here, abs=1e-6)
+    assert stage.position_deg() == tested.near(here)
 
 
-def test_a_stop_is_allowed_at_any_time(stage: Stage) -> None:
+def test_a_stop_is_allowed_at_any_time(tested: StageUnderTest) -> None:
+    tested.stage.stop()
+    tested.stage.stop()
+    stage = tested.homed()
     stage.stop()
+    stage.start_move(tested.at(0.5))
+    assert stage.wait() == tested.near(tested.at(0.5))
     stage.stop()
-    stage.home()
-    stage.stop()
-    stage.start_move(5.0)
-    assert stage.wait() == pytest.approx(5.0, abs=TOLERANCE_DEG)
-    stage.stop()
-    assert stage.position_deg() == pytest.approx(5.0, abs=TOLERANCE_DEG)
+    assert stage.position_deg() == tested.near(tested.at(0.5))
 
 
-def test_a_stop_ends_a_move_before_its_target(stage: Stage) -> None:
-    stage.home()
-    stage.start_move(9.0)
+def test_a_stop_ends_a_move_before_its_target(tested: StageUnderTest) -> None:
+    stage = tested.homed()
+    stage.start_move(tested.at(0.9))
     stage.stop()
     try:
         where = stage.wait()
     except DeviceError:
         where = stage.position_deg()
-    assert where < 9.0
-    stage.start_move(1.0)  # the next move is possible
-    assert stage.wait() == pytest.approx(1.0, abs=TOLERANCE_DEG)
+    assert abs(where - tested.home_deg) < abs(tested.at(0.9) - tested.home_deg)
+    stage.start_move(tested.at(0.1))  # the next move is possible
+    assert stage.wait() == tested.near(tested.at(0.1))
 
 
-def test_waiting_without_a_move_returns_the_position(stage: Stage) -> None:
-    stage.home()
-    assert stage.wait() == pytest.approx(0.0, abs=TOLERANCE_DEG)
+def test_waiting_without_a_move_returns_the_position(tested: StageUnderTest) -> None:
+    assert tested.homed().wait() == tested.near(tested.home_deg)
 
 
-def test_closing_twice_is_allowed(stage: Stage) -> None:
-    stage.close()
-    stage.close()
+def test_closing_twice_is_allowed(tested: StageUnderTest) -> None:
+    tested.stage.close()
+    tested.stage.close()

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from drivers.factory import Lines, open_stage
 from drivers.lines.serial_line import NoReply
@@ -22,7 +21,7 @@ from instrument.devices import REPLY_S
 from instrument.errors import DeviceError, InputError
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.wire import Fault, PtyWire
-from tests.support.paths import CONFIGS
+from tests.support.stages.bench_rig import write_bench_rig
 from tests.support.stages.emulated_stages import port_of
 from tests.support.stages.kinds import STEPS_PER_DEG, controller_for
 from tests.support.stages.modbus_tcp_gateway import TcpWire
@@ -108,14 +107,8 @@ def test_the_watchdog_allows_for_one_lost_answer(reply_s: float) -> None:
 def test_axes_on_one_port_have_the_same_line(
     tmp_path: Path, first: dict[str, Any], second: dict[str, Any], says: str
 ) -> None:
-    rig = yaml.safe_load((CONFIGS / "rigs" / "emulated.yaml").read_text())
     keys = KEYS | {"driver": "oriental", "port": "tcp://gateway:502", "steps_per_deg": 1000.0}
-    rig["axes"]["theta_i"] = keys | {"unit": 1} | first
-    rig["axes"]["dphi"] = keys | {"unit": 2} | second
-    rig["axes"]["theta_r"]["port"] = "/dev/serial/by-id/zaber"
-    rig["camera"]["device"] = "/dev/v4l/by-id/camera"
-    rig["lamp"] = {"driver": "manual", "darkened_by": "hand", "white_electrons_per_s": 1e6}
-    path = tmp_path / "rig.yaml"
-    path.write_text(yaml.safe_dump(rig))
+    theta_i, dphi = keys | {"unit": 1} | first, keys | {"unit": 2} | second
+    path = write_bench_rig(tmp_path / "rig.yaml", theta_i=theta_i, dphi=dphi)
     with pytest.raises(InputError, match=says):
         load_rig(path)
