@@ -58,20 +58,15 @@ def test_a_person_reads_parameters_candidates_and_why(rough: Path) -> None:
     assert "wolff" not in done.stdout
 
 
-def test_a_narrow_terminal_wraps_names_and_cuts_no_number(
-    rough: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def candidates(columns: int) -> str:
+def test_a_narrow_terminal_cuts_no_number(rough: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def printed(columns: int) -> str:
         monkeypatch.setenv("COLUMNS", str(columns))
-        done = gonio_process(
-            "fit", rough, "--models", "lambert,lambert+torrance_sparrow,oren_nayar"
-        )
-        return done.stdout[done.stdout.index("→") :].partition("→ chosen")[0]
+        models = "lambert,lambert+torrance_sparrow,oren_nayar"
+        return gonio_process("fit", rough, "--models", models).stdout
 
     number = r"-?\d[\d.e+]*"
-    wide, narrow = candidates(200), candidates(50)
-    assert re.findall(number, narrow) == re.findall(number, wide)
-    assert "…" not in narrow
+    wide, narrow = printed(200), printed(50)
+    assert sorted(re.findall(number, narrow)) == sorted(re.findall(number, wide))
     assert max(map(len, narrow.splitlines())) <= 50 < max(map(len, wide.splitlines()))
 
 
