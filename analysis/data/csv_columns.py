@@ -55,24 +55,27 @@ class Column:
         return value
 
 
-_DECIMAL_COMMA = re.compile(r"([-+]?[0-9]+),([0-9]+)")
+# A number in an everyday form: 0,5; −5 with a typographic minus; 30° or 30 deg.
+_EVERYDAY = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?)\s*(?:°|deg|degrees)?")
+
+_LONGEST = 40  # characters of a number that is suggested
 
 
 def _hint(text: str) -> str:
-    """Correction of a decimal comma."""
-    found = _DECIMAL_COMMA.fullmatch(text.strip())
-    return f" (write {found[1]}.{found[2]})" if found else ""
+    """Correction of a number in an everyday form."""
+    found = _EVERYDAY.fullmatch(text[:_LONGEST].strip().replace("−", "-").replace("–", "-"))
+    return f" (write {found[1].replace(',', '.')})" if found else ""
 
 
 # Far beyond any measurement, but squares and ratios of such values do not overflow.
 BRDF = Column("brdf", "1/sr", "-1e15 to 1e15 1/sr", -1e15, 1e15)
 U_BRDF = Column("u_brdf", "1/sr", "1e-15 to 1e15 1/sr", 1e-15, 1e15)
-NEEDED = (
+ANGLES = (
     Column("theta_i_deg", "deg", "a number from 0 to 90 deg", 0.0, 90.0),
     Column("theta_r_deg", "deg", "a number from -90 to 90 deg", -90.0, 90.0),
     Column("dphi_deg", "deg", "a finite number of deg"),
-    BRDF,
 )
+NEEDED = (*ANGLES, BRDF)
 COLUMNS = (*NEEDED, U_BRDF)
 
 FLAGS = "flags"

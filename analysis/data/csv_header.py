@@ -16,6 +16,7 @@ HEADER = "a header with theta_i_deg, theta_r_deg, dphi_deg, brdf and, where know
 ROWS = "a row for each geometry"
 MAX_COLUMNS = 1000
 _OTHER_UNIT = re.compile(r"\bm?rad\b|%")  # a new name alone would not convert the values
+_SEARCHED_LINES = 100
 _YAML_LINE = re.compile(r"[A-Za-z_]+:(\s|\Z)")
 _GREEK = str.maketrans(
     {"θ": "theta_", "ϑ": "theta_", "φ": "phi_", "ϕ": "phi_", "δ": "d", "ᵢ": "i", "ᵣ": "r"}
@@ -77,6 +78,8 @@ def _other_separator(text: str, names: list[str]) -> str | None:
 def _check_names(file: TextFile, line: int, names: list[str], starts: list[int]) -> None:
     missing = [column.name for column in NEEDED if column.name not in names]
     renamed = _renamed(names)
+    if len(missing) == len(NEEDED) and not renamed:
+        raise _refused(file, line, 1, _no_header(file, line, names))
     if missing or renamed:
         raise _refused(file, line, 1, _wrong_names(names, missing, renamed))
     for name in filter(is_read, dict.fromkeys(names)):
@@ -86,10 +89,20 @@ def _check_names(file: TextFile, line: int, names: list[str], starts: list[int])
             file.note(line, place, f"{what}; keep one of them")
 
 
-def _wrong_names(names: list[str], missing: list[str], renamed: dict[str, str]) -> str:
-    """Missing columns, and the names to change; without any known name, what the line may be."""
-    if len(missing) == len(NEEDED) and not renamed and _YAML_LINE.match(names[0]):
+def _no_header(file: TextFile, line: int, names: list[str]) -> str:
+    """A line without any known name: where the header may be, or what the file may be."""
+    if _YAML_LINE.match(names[0]):
         return "header: the file looks like YAML, not like a table; `gonio plan` reads a protocol"
+    needed = {column.name for column in NEEDED}
+    for number, text in enumerate(file.lines[:_SEARCHED_LINES], start=1):
+        if len(needed & {name.strip(' "#') for name in text.split(",")}) > 1:
+            what = "remove its #" if number < line else "begin the lines above it with #"
+            return f"header: line {number} looks like the header: {what}"
+    return _wrong_names(names, [column.name for column in NEEDED], {})
+
+
+def _wrong_names(names: list[str], missing: list[str], renamed: dict[str, str]) -> str:
+    """Missing columns, and the names to change."""
     found = ", ".join(printable(name[:40]) or "''" for name in names[:20])
     found += ", ..." if len(names) > 20 else ""
     still = [name for name in missing if name not in renamed]

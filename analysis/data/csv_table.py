@@ -23,7 +23,7 @@ import numpy as np
 
 from analysis.data import csv_columns as columns
 from analysis.data.acceptance import Acceptance
-from analysis.data.csv_columns import BRDF, COLUMNS, U_BRDF, Column
+from analysis.data.csv_columns import ANGLES, BRDF, COLUMNS, U_BRDF, Column
 from analysis.data.csv_header import ROWS, Header, read_header
 from analysis.data.csv_line import QuoteError, column_of, texts_of
 from analysis.data.csv_optional import OptionalColumns
@@ -105,6 +105,10 @@ class _Table:
         if flags is not None and fields[flags].strip():
             self.flagged += 1
             return
+        if not self.fields and self._holds_no_number(fields):
+            what = "row: no number in it; begin a line of units or of names with #"
+            self.file.note(line, 1, what)
+            return
         row = [self._value(line, column, fields) for column in COLUMNS]
         self.rows.append(row)
         self.fields.append((line, fields))
@@ -114,6 +118,11 @@ class _Table:
             what = f"the same three angles as in line {first}"
             allowed = "each geometry once; average repeats with their u: --repeats mean"
             self._note(line, "theta_i_deg", f"{what}; allowed: {allowed}")
+
+    def _holds_no_number(self, fields: list[str]) -> bool:
+        """True if each angle is a text without a digit, as in a second line of the header."""
+        texts = [fields[self.header.indices[column.name]].strip() for column in ANGLES]
+        return all(text and not any(map(str.isdigit, text)) for text in texts)
 
     def _note_width(self, line: int, text: str, width: int) -> None:
         what = f"row: {width} {'field' if width == 1 else 'fields'}; allowed: {self.header.width}"

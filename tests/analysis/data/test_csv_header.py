@@ -14,6 +14,7 @@ from tests.support.analysis.csv_texts import (
     assert_mistake,
     changed,
     problems,
+    read,
 )
 
 # Table, text to replace, replacement, and the whole message, with positions counted by hand.
@@ -97,6 +98,25 @@ def test_an_angle_in_radians_is_missing(name: str) -> None:
     (found,) = problems(changed(BARE, "theta_i_deg", name))
     assert "missing: theta_i_deg" in found
     assert "write theta_i_deg" not in found
+
+
+def test_a_header_that_stands_elsewhere_is_pointed_out() -> None:
+    assert problems("# " + BARE) == (
+        "data.csv:2:1: header: line 1 looks like the header: remove its #",
+    )
+    assert problems("Foam, dry\n\n" + BARE) == (
+        "data.csv:1:1: header: line 3 looks like the header: begin the lines above it with #",
+    )
+    (found,) = problems(BARE.partition("\n")[2])  # none at all
+    assert "missing: theta_i_deg, theta_r_deg, dphi_deg, brdf; found: 30, -20.5, 0, 0.25;" in found
+
+
+def test_a_line_of_units_is_one_mistake() -> None:
+    header, _, rows = BARE.partition("\n")
+    assert problems(f"{header}\ndeg,deg,deg,1/sr\n{rows}") == (
+        "data.csv:2:1: row: no number in it; begin a line of units or of names with #",
+    )
+    assert read(f"{header}\n#deg,deg,deg,1/sr\n{rows}").size == 2
 
 
 def test_a_line_of_commas_alone_is_refused_at_once() -> None:

@@ -111,6 +111,18 @@ MISTAKES = {
         '"-20,5"',
         "2:4: theta_r_deg: '-20,5' is text; allowed: a number from -90 to 90 deg (write -20.5)",
     ),
+    "typographic minus": (
+        PLAIN,
+        "-20.5",
+        "−20.5",
+        "2:4: theta_r_deg: '−20.5' is text; allowed: a number from -90 to 90 deg (write -20.5)",
+    ),
+    "unit in the field": (
+        PLAIN,
+        "-20.5",
+        "-20.5°",
+        "2:4: theta_r_deg: '-20.5°' is text; allowed: a number from -90 to 90 deg (write -20.5)",
+    ),
     "decimal comma without quotes": (
         PLAIN,
         "0.25",
