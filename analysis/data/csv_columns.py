@@ -63,8 +63,8 @@ _LONGEST = 40  # characters of a number that is suggested
 
 def _hint(text: str) -> str:
     """Correction of a number in an everyday form."""
-    found = _EVERYDAY.fullmatch(text[:_LONGEST].strip().replace("−", "-").replace("–", "-"))
-    return f" (write {found[1].replace(',', '.')})" if found else ""
+    found = _EVERYDAY.fullmatch(text.strip().replace("−", "-").replace("–", "-"))
+    return f" (write {found[1].replace(',', '.')})" if found and len(text) <= _LONGEST else ""
 
 
 # Far beyond any measurement, but squares and ratios of such values do not overflow.
