@@ -45,9 +45,8 @@ def _answers(port: str) -> Iterator[str]:
     clock = SystemClock()
     for kind, baudrate, query in _QUERIES:
         with Line(kind, port, baudrate, clock) as line:
-            line.write(query)
             try:
-                answer = line.read_line(clock.now_s() + line.reply_s, kind)
+                answer = line.exchange(kind, query, lambda heard: heard or None)
             except NoReply:
                 continue
             yield f"{answer.decode('ascii', 'replace')!r} when asked as {kind}"

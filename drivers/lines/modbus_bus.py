@@ -114,6 +114,11 @@ class ModbusBus(Closeable):
             look = _CHECK_GATEWAY if self._tcp else _CHECK_PORT
             raise PortGone(f"{who}: cannot open {self.port}: {error}: {look}") from error
 
+    def release_foreign(self) -> None:
+        """Close a port that was opened again for a stop, and may belong to another device."""
+        if self._gone:
+            self._close_client()
+
     def listen_for_quiet(self, who: str) -> bool:
         """Listen briefly; True once the line has been quiet for as long as an answer may take."""
         self.open(who)
@@ -243,7 +248,8 @@ class ModbusUnit:
         while True:
             try:
                 with self._bus.lock.hold(urgent=True):
-                    return self._write_one(register, value)
+                    self._write_one(register, value)
+                    return self._bus.release_foreign()
             except PortGone:
                 if self._bus.closed or self._bus.clock.now_s() > until_s:
                     raise

@@ -21,6 +21,7 @@ log = logging.getLogger(__name__)
 
 _TRIES = 3
 _QUIET_S = 0.1
+_DEAF_S = 0.07  # ten public drivers wait 60 ms after a command, by trial and error
 
 T = TypeVar("T")
 
@@ -31,10 +32,14 @@ class NewportPort:
     Answers carry no number, so one is trusted only on a clean line. After a time-out the input is
     drained, and the controller must report the same version as when it was opened; after the port
     was gone, also the same stage.
+
+    A controller may hear nothing for a moment after a command. Whether it does shows the first time
+    that its error code does not come.
     """
 
-    def __init__(self, line: Line, address: int, who: str) -> None:
-        self.line, self.address, self.who = line, address, who
+    def __init__(self, line: Line, address: int, who: str, clock: Clock) -> None:
+        self.line, self.address, self.who, self._clock = line, address, who, clock
+        self._deaf = False
         self.version, self.stage, self._openings = "", "", line.openings
         self.version = self.query("VE", str)
 
@@ -58,9 +63,11 @@ class NewportPort:
             self._clean()
             try:
                 self.line.write(framing.command(self.address, letters, value))
+                self._clock.sleep(_DEAF_S if self._deaf else 0.0)
                 letter = self._query_once("TE", str, "")
             except (NoReply, Garbled) as error:
                 log.warning("%s; %s may or may not have been taken", error, letters)
+                self._deaf = True
                 return  # reading the error again would find it cleared
         if letter != "@":
             why = framing.ERRORS.get(letter[:1], "an error that this program does not know")
@@ -122,7 +129,7 @@ class NewportStage(MotorStage):
         super().__init__(name, limits, clock, line, line.reply_s)
         self._model = model
         self._who = f"{name} (Newport {model}, address {address} on {line.port})"
-        self._port = NewportPort(line, address, self._who)
+        self._port = NewportPort(line, address, self._who, clock)
         if not self._port.version.startswith(NAMES[model]):
             raise DeviceError(
                 f"{self._who}: calls itself {self._port.version!r}; expected of a {model}: "

@@ -53,6 +53,11 @@ class ZaberPort:
                     "a position: set comm.checksum to 1 with the maker's program (Zaber Launcher)"
                 ) from error
             self.switched_on = True
+            if not self.query("get comm.checksum", axis=0).checked:
+                raise DeviceError(
+                    f"{self.who}: its replies carry no checksum although comm.checksum is 1: look "
+                    "at what lies between it and the port"
+                )
         self.checked = True
 
     def query(self, text: str, axis: int | None = None, tries: int = _TRIES) -> Reply:
@@ -93,10 +98,15 @@ class ZaberPort:
         self.line.write_at_once(framing.command(self.device, self.axis, _STOP_ID, "stop"))
 
     def _own_reply(self, line: bytes, axis: int, number: int) -> Reply | None:
-        reply = framing.reply_of(line, self.checked)
+        reply = framing.reply_of(line, require_checksum=False)
         expected = (self.device, axis, number)
         if reply is None or (reply.device, reply.axis, reply.message_id) != expected:
             return None
+        if self.checked and not reply.checked:
+            raise Garbled(
+                f"{self.who}: a reply without its checksum, {line[:40]!r}: if that stays, its "
+                "comm.checksum is 0 again: start the program anew, which sets it"
+            )
         return reply
 
 

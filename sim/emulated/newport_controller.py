@@ -7,6 +7,7 @@ number of decimals, the time of an answer (here none; a query takes some 10 ms),
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 from sim.emulated.motor import Motor
@@ -24,12 +25,20 @@ VERSIONS = {
 class NewportController:
     """One controller at an address. `motor.alarm` holds the four error digits of `TS`.
 
-    `moves`: number of moves started.
+    `moves`: number of moves started. `deaf_s`: time after a command in which nothing is heard; ten
+    public drivers wait 60 ms.
     """
 
     def __init__(
-        self, motor: Motor, address: int = 1, model: str = "SMC100", stage: str = STAGE
+        self,
+        motor: Motor,
+        address: int = 1,
+        model: str = "SMC100",
+        stage: str = STAGE,
+        deaf_s: float = 0.0,
+        now_s: Callable[[], float] = time.monotonic,
     ) -> None:
+        self._deaf_s, self._now_s, self._hears_at_s = deaf_s, now_s, now_s()
         self.motor, self.address = motor, address
         self._version = VERSIONS[model]
         self._stage = stage
@@ -48,7 +57,9 @@ class NewportController:
         """Return the answers to all lines completed by these bytes."""
         *lines, self._buffer = (self._buffer + data).split(b"\n")
         return b"".join(
-            self._answer_line(line.strip().decode("ascii", "replace")) for line in lines
+            self._answer_line(line.strip().decode("ascii", "replace"))
+            for line in lines
+            if self._now_s() >= self._hears_at_s
         )
 
     def _answer_line(self, line: str) -> bytes:
@@ -73,6 +84,7 @@ class NewportController:
         if letters in self.values and value == "?":
             return f"{self.values[letters]:g}"
         self._act(letters, value)
+        self._hears_at_s = self._now_s() + self._deaf_s
         return None
 
     def _act(self, letters: str, value: str) -> None:

@@ -17,7 +17,7 @@ from sim.emulated.motor import Motor
 MICROSTEPS_PER_DEG = 1_536_000 / 360  # X-RSW60
 _SPEED_PER_MICROSTEP = 1.6384
 _ACCELERATION_PER_MICROSTEP = 1.6384e-4
-_SETTABLE = {"maxspeed": range(1, 1 << 31), "accel": range(1, 32768), "comm.checksum": range(2)}
+_SETTABLE = {"maxspeed": range(1, 1 << 31), "accel": range(1, 1 << 31), "comm.checksum": range(2)}
 _COMMAND = re.compile(r"/(\d+)?(?: (\d+))?(?: (\d\d))?(?: ([a-z].*))?")
 
 

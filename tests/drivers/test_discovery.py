@@ -13,6 +13,7 @@ from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.newport_controller import NewportController
 from sim.emulated.wire import PtyWire
 from sim.emulated.zaber_controller import ZaberController
+from tests.support.stages.plug import Echoing
 
 pytestmark = pytest.mark.waits
 
@@ -29,6 +30,13 @@ def test_the_first_answer_is_quoted(
 ) -> None:
     with PtyWire([controller(Motor(Mechanics(), SystemClock()))]) as wire:
         assert re.fullmatch(answer, identify_controller(wire.port))
+
+
+def test_an_adapters_echo_is_no_answer() -> None:
+    controller = NewportController(Motor(Mechanics(), SystemClock()))
+    with PtyWire([Echoing(controller)]) as wire:
+        said = identify_controller(wire.port)
+    assert re.fullmatch(r"'1VE SMC_CC - .*' when asked as Newport SMC100", said)
 
 
 def test_a_silent_port_has_no_answer() -> None:

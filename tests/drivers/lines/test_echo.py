@@ -11,26 +11,15 @@ from drivers.stages.motor_stage import MotorStage
 from instrument.clock import SystemClock
 from instrument.errors import DeviceError
 from sim.emulated.motor import Motor
-from sim.emulated.wire import Controller, PtyWire
+from sim.emulated.wire import PtyWire
 from tests.support.stages.emulated_stages import LIMITS, MECHANICS, SLOW
 from tests.support.stages.kinds import controller_for, open_stage
+from tests.support.stages.plug import Echoing
 from tests.support.stages.waiting import wait_until
 
 pytestmark = pytest.mark.waits
 
 KINDS = ("newport", "zaber", "oriental rtu")
-
-
-class Echoing:
-    """Adapter in front of a controller; `dead`: the controller behind it has no power."""
-
-    def __init__(self, controller: Controller) -> None:
-        self._controller = controller
-        self.echoes, self.dead = True, False
-
-    def answer(self, data: bytes) -> bytes:
-        echo = data if self.echoes else b""
-        return echo + (b"" if self.dead else self._controller.answer(data))
 
 
 def opened(kind: str, wire: PtyWire) -> MotorStage:

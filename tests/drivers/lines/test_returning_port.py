@@ -117,7 +117,7 @@ def test_another_device_under_the_same_link_is_refused(setup: Setup) -> None:
         other = NewportController(motor, stage="LTA-HS_PN:B0601246985104_UD:062510")
     else:
         other = ZaberController(motor)
-        other.settings["system.serial"] = 75002
+        other.settings |= {"system.serial": 75002, "comm.checksum": 1}
     with pytest.raises(DeviceError, match="theta_r"):
         setup.stage.position_deg()
     setup.plug.put_in(other)

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+
 import pytest
 
 from drivers.lines.serial_line import Line
+from drivers.stages.motor_stage import Stopped
 from drivers.stages.newport import NewportStage
 from instrument.clock import SystemClock
 from instrument.errors import DeviceError
 from sim.emulated.motor import Motor
 from sim.emulated.newport_controller import NewportController
 from sim.emulated.wire import PtyWire
-from tests.support.stages.emulated_stages import LIMITS, MECHANICS
+from tests.support.stages.emulated_stages import LIMITS, MECHANICS, SLOW
+from tests.support.stages.waiting import wait_until
 
 pytestmark = pytest.mark.waits
 
@@ -72,3 +79,48 @@ def test_a_real_controllers_version_is_accepted(model: str, version: str) -> Non
     with PtyWire([controller]) as wire, Line("theta_r", wire.port, 57600, clock) as line:
         stage = NewportStage("theta_r", line, 1, model, LIMITS, clock)
         assert version.strip() in stage.identity()
+
+
+@pytest.fixture
+def deaf() -> Iterator[tuple[NewportStage, Motor]]:
+    """A stage whose controller hears nothing for 60 ms after a command."""
+    clock = SystemClock()
+    motor = Motor(SLOW, clock)
+    limits = replace(LIMITS, speed_deg_per_s=20.0, acceleration_deg_per_s2=400.0)
+    with (
+        PtyWire([NewportController(motor, deaf_s=0.06)]) as wire,
+        Line("theta_r", wire.port, 57600, clock) as line,
+    ):
+        yield NewportStage("theta_r", line, 1, "SMC100", limits, clock), motor
+
+
+def test_a_controller_that_is_deaf_after_a_command_is_waited_for(
+    deaf: tuple[NewportStage, Motor], caplog: pytest.LogCaptureFixture
+) -> None:
+    stage, _ = deaf
+    stage.home()
+    for angle_deg in (2.0, -1.0, 0.5):
+        stage.start_move(angle_deg)
+        assert stage.wait() == pytest.approx(angle_deg, abs=1e-3)
+    lost = [r for r in caplog.records if "may or may not have been taken" in r.getMessage()]
+    assert len(lost) == 1
+
+
+def test_a_stop_reaches_a_controller_that_is_deaf_after_the_move_command(
+    deaf: tuple[NewportStage, Motor],
+) -> None:
+    stage, motor = deaf
+    stage.home()
+    stage._port._deaf = False  # so that it is stopped at once after the command
+    starting = threading.Thread(target=_start, args=(stage,))
+    starting.start()
+    wait_until(lambda: motor.moving)
+    stage.stop()
+    starting.join(timeout=5)
+    wait_until(lambda: not motor.moving)
+    assert motor.position_deg < 60.0
+
+
+def _start(stage: NewportStage) -> None:
+    with contextlib.suppress(Stopped):
+        stage.start_move(70.0)

@@ -72,7 +72,7 @@ def test_a_reply_that_loses_its_checksum_later_is_not_believed() -> None:
     with PtyWire([controller]) as wire:
         stage = opened(controller, wire)
         controller.settings["comm.checksum"] = 0  # another program, or its factory settings
-        with pytest.raises(Garbled, match=r"only b'@01 1 \d\d OK IDLE WH"):
+        with pytest.raises(Garbled, match=r"without its checksum.*comm.checksum is 0 again"):
             stage.status()
         stage.close()
 
@@ -113,3 +113,17 @@ def test_a_stopped_move_is_flagged_and_no_fault(monkeypatch: pytest.MonkeyPatch)
     assert any(b" NI " in reply for reply in found.wire.genuine)
     stage.start_move(0.0)
     assert stage.wait() == pytest.approx(0.0, abs=1e-3)
+
+
+class _Stripped(ZaberController):
+    """Device behind something that cuts its checksums off."""
+
+    def _reply(self, axis: str, number: str | None, flag: str, data: str) -> bytes:
+        return super()._reply(axis, number, flag, data).partition(b":")[0].strip() + b"\r\n"
+
+
+def test_replies_whose_checksum_is_lost_on_the_way_are_named() -> None:
+    controller = _Stripped(Motor(SLOW, SystemClock()))
+    refused = pytest.raises(DeviceError, match=r"no checksum although comm.checksum is 1")
+    with PtyWire([controller]) as wire, refused:
+        opened(controller, wire)

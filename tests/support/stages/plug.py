@@ -1,4 +1,4 @@
-"""Plug of a serial adapter: it can be pulled out, and put in again under the same link."""
+"""Serial adapters: one can be pulled out and put in again under the same link, one echoes."""
 
 from __future__ import annotations
 
@@ -52,3 +52,15 @@ class EventfulClock(SystemClock):
         self._skipped_s += seconds
         then, self.then = self.then, lambda: None
         then()
+
+
+class Echoing:
+    """Adapter in front of a controller; `dead`: the controller behind it has no power."""
+
+    def __init__(self, controller: Controller) -> None:
+        self._controller = controller
+        self.echoes, self.dead = True, False
+
+    def answer(self, data: bytes) -> bytes:
+        echo = data if self.echoes else b""
+        return echo + (b"" if self.dead else self._controller.answer(data))
