@@ -155,7 +155,7 @@ def _interruptions_note(record: Record) -> str:
     texts = (
         f"the scan was interrupted {resumed} times" if resumed else "",
         f"the lamp level had jumped after {jumps} of them and is corrected" if jumps else "",
-        f"{retries} retries of device commands, see the events in the record" if retries else "",
+        f"{retries} retries and warnings, see the events in the record" if retries else "",
     )
     return "; ".join(text for text in texts if text)
 
