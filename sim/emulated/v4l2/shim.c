@@ -300,11 +300,24 @@ int ioctl(int descriptor, unsigned long request, ...)
 MMAP_LIKE(mmap, off_t)
 MMAP_LIKE(mmap64, off64_t)
 
+/* Returns once the camera has released what the descriptor held, as close() of a device does. */
+static void release(struct device *device)
+{
+    char rest[MAX_BYTES];
+
+    pthread_mutex_lock(&device->exchange);
+    shutdown(device->socket, SHUT_WR);
+    while (receive(device->socket, rest, sizeof rest) > 0)
+        ;
+    pthread_mutex_unlock(&device->exchange);
+}
+
 int close(int descriptor)
 {
     struct device *device = device_of(descriptor);
 
     if (device) {
+        release(device);
         pthread_mutex_lock(&devices_lock);
         device->descriptor = -1;
         system_close(device->socket);
