@@ -111,7 +111,7 @@ def _dark_frames() -> int:
 
 
 def _u_rounding(scene: Scene, sensor: CameraConfig) -> float:
-    """Relative uncertainty that the program states for rounding, of light and dark together."""
+    """Relative uncertainty by rounding of plain means, of light and dark together."""
     gain, electrons = sensor.electrons_per_dn, scene.level * sensor.full_well_electrons
     noise2 = sensor.read_noise_electrons**2
     both = [rounding_u_dn(variance / gain**2) for variance in (electrons + noise2, noise2)]

@@ -105,3 +105,21 @@ def test_every_defect_is_flagged(level: int, size: float, theta_r: float, flag: 
     frames = [Frame(np.full(SHAPE, level, np.uint16), 0.01, 0.0)] * 2
     signal = measure(frames, _dark(), _window(theta_r, size), CAMERA, ON_AXIS, 100)
     assert signal.flags == flag
+
+
+@pytest.mark.parametrize("part", [-0.3, -0.15, 0.15, 0.3])
+def test_a_dark_between_two_counts_is_subtracted_as_it_is(part: float) -> None:
+    """Noise of a quarter count leaves up to 0.09 counts of rounding in its mean."""
+    dark = average_dark(_frames(64 + part, 0.25, 8, seed=4), CAMERA)
+    light = _frames(1064 + part, 3.0, 4, seed=5)
+    signal = measure(light, dark, _window(), CAMERA, ON_AXIS, 100)
+    plain = measure(
+        [Frame(np.full(SHAPE, 1000, np.uint16), 0.01, 0.0)] * 2,
+        Dark(0.01, np.zeros(SHAPE), np.zeros(SHAPE), 8),
+        _window(),
+        CAMERA,
+        ON_AXIS,
+        100,
+    )
+    assert abs(signal.signal_dn - plain.signal_dn) < 4 * signal.u_noise_dn < 0.04
+    assert signal.u_dark_dn < 0.01
