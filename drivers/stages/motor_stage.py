@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import logging
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from drivers.stages.motion import LONG_S, STALLED_S, HomingMonitor, Limits, MoveMonitor, Status
 from drivers.stages.watchdog import Watchdog
@@ -198,7 +200,8 @@ class MotorStage(ABC):
         self._started_s = self._clock.now_s()
         self.watchdog.begin()
         try:
-            self._send_move(angle_deg)
+            with self._explained():
+                self._send_move(angle_deg)
             self._repeat_stop()
         except BaseException:
             self.watchdog.end()
@@ -256,18 +259,31 @@ class MotorStage(ABC):
 
     def _poll(self) -> Status:
         """Return the status during a motion; raise if there is a fault or the stage was stopped."""
-        try:
+        with self._explained():
             now = self.watchdog.poll(self.status)
-        except DeviceError as error:
-            if self.watchdog.fired:
-                raise type(error)(f"{error}; {self._no_status}") from error
-            raise
         self._raise_if_unwatched()
         if self._stopped:
             self._target_deg = None
             raise Stopped(f"{self.name}: stopped at {now.position_deg:g} deg")
         self._refuse_fault(now)
         return now
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        """Add to an error of the line what the watchdog has found, if it has stopped the stage.
+
+        Answers that were lost in a pause of the computer are no fault of the line; whether it is
+        in order shows before the stage is moved on.
+        """
+        try:
+            yield
+        except (Stopped, ComputerPaused):
+            raise
+        except DeviceError as error:
+            if not self.watchdog.fired:
+                raise
+            kind = ComputerPaused if self.watchdog.paused_s else type(error)
+            raise kind(f"{error}; {self._no_status}") from error
 
     def _raise_if_unwatched(self) -> None:
         """Raise, once the watchdog has stopped the stage, what was to blame: computer or line."""

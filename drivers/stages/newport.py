@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 
 _TRIES = 3
 _QUIET_S = 0.1
-_DEAF_S = 0.07  # ten public drivers wait 60 ms after a command, by trial and error
+_DEAF_S = 0.1  # ten public drivers wait 60 ms after a command, by trial and error
 
 T = TypeVar("T")
 

@@ -86,7 +86,7 @@ def test_mbpoll_homes_and_moves_our_drive(drive: OrientalController, kind: str) 
     with PtyWire([drive]) if kind == "rtu" else TcpWire([ModbusTcpGateway([drive])]) as wire:
         _mbpoll(wire, 0x7D, "16", count=0)
         _arrives(drive)
-        _mbpoll(wire, 0x58, *map(str, move_block(12345, 2000, 1500)), count=0)
+        _mbpoll(wire, 0x58, *map(str, move_block(12345, 200_000, 10_000_000)), count=0)
         _arrives(drive)
         assert _mbpoll(wire, 0xCC, count=2) == [0, 12345]
         assert _mbpoll(wire, 0x7E, count=4) == [0, 1 << 14 | 1 << 5 | 1 << 4, 0, 0]

@@ -12,7 +12,7 @@ from drivers.stages.motion import Limits
 from drivers.stages.motor_stage import MotorStage
 from drivers.stages.pause_meter import PAUSE_S, PauseMeter
 from instrument.clock import SystemClock
-from instrument.errors import ComputerPaused
+from instrument.errors import ComputerPaused, DeviceError
 from sim.emulated.motor import Motor
 from sim.emulated.wire import Controller, Fault, PtyWire
 from tests.support.stages.emulated_stages import LIMITS, SLOW
@@ -117,6 +117,23 @@ def test_a_pause_while_the_move_is_sent_is_named(setup: Setup, command: bytes) -
     assert setup.moves_on()
 
 
+@pytest.mark.parametrize("setup", ["oriental rtu"], indirect=True)
+def test_answers_that_are_lost_in_a_pause_are_no_fault_of_the_line(setup: Setup) -> None:
+    """The drive's registers cannot be asked in time whether it has taken the move."""
+    setup.line.command = b"\x10\x00\x58"
+    watchdog = setup.stage.watchdog
+
+    def much_later() -> None:
+        wait_until(lambda: watchdog.fired)
+        setup.clock.pause()
+        setup.line.noted.set()
+
+    threading.Thread(target=much_later).start()
+    with pytest.raises(ComputerPaused, match=r"theta_r: .*the computer paused for 1.3 s"):
+        setup.stage.start_move(70.0)
+    assert setup.moves_on()
+
+
 @pytest.mark.parametrize("setup", ["newport"], indirect=True)
 def test_a_pause_too_short_to_matter_ends_nothing(setup: Setup) -> None:
     setup.stage.start_move(20.0)
@@ -126,13 +143,17 @@ def test_a_pause_too_short_to_matter_ends_nothing(setup: Setup) -> None:
 
 
 @pytest.mark.parametrize("setup", ["newport"], indirect=True)
-def test_a_line_that_was_silent_anyway_is_not_excused_by_a_pause(setup: Setup) -> None:
+def test_a_line_that_falls_silent_in_a_pause_is_named_before_anything_moves(setup: Setup) -> None:
+    moves = setup.moves()
     setup.stage.start_move(70.0)
     setup.wire.inject(*[Fault("drop")] * 500)
     wait_until(lambda: setup.wire.pending < 500)
     setup.clock.pause(1.5 * PAUSE_S)
-    with pytest.raises(NoReply, match=r"theta_r.*no answer within 0.15 s"):
+    with pytest.raises(DeviceError, match=r"theta_r.*no answer within 0.15 s"):
         setup.stage.wait()
+    with pytest.raises(NoReply, match=r"theta_r.*no answer within 0.15 s"):
+        setup.stage.homed()  # asked before it would be moved on
+    assert setup.moves() == moves + 1
 
 
 def test_a_pause_is_known_before_the_meters_own_thread_wakes() -> None:
