@@ -17,6 +17,9 @@ from instrument.errors import DeviceError, OperatorStop, StorageError
 from instrument.record.event_kinds import FAULT, FINISHED, STOPPED
 from instrument.record.record import Record
 
+# Loggers of what the scan waits for, so that a person can help: the record, a lost camera.
+_TO_BE_SEEN = ("instrument.record", "acquisition.engine.retrying_camera")
+
 
 def scan(loaded: Loaded, plan: Plan, record: Record, progress: Progress | None = None) -> None:
     """Run the plan, or what is missing of it; the caller has claimed the run.
@@ -24,7 +27,7 @@ def scan(loaded: Loaded, plan: Plan, record: Record, progress: Progress | None =
     Raises `OperatorStop`, `DeviceError` or `StorageError` with the command that resumes the scan.
     """
     clock: Clock = SystemClock()
-    with log_to_record(record) as log, warnings_shown("instrument.record"):
+    with log_to_record(record) as log, warnings_shown(*_TO_BE_SEEN):
         try:
             with closing(open_devices(loaded)) as devices:
                 clock = devices.clock

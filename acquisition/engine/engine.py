@@ -68,8 +68,10 @@ class Engine:
         self._ended = False
         note = partial(self._add_event, OPERATOR)
         self._positioner = Positioner(rig, devices.axes, devices.lamp, devices.operator, note)
-        camera = RetryingCamera(devices.camera, devices.clock, rig.camera.reconnect_s)
-        self._exposer = Exposer(camera, devices.lamp, devices.clock, protocol, rig, record)
+        self._begun_step = (0, 0.0, 0.0)  # its index, and its begin in scan time and connected time
+        wait_s, clock = rig.camera.reconnect_s, devices.clock
+        camera = RetryingCamera(devices.camera, clock, wait_s, self._continue_step)
+        self._exposer = Exposer(camera, devices.lamp, clock, protocol, rig, record)
 
     def run(self, plan: Plan, progress: Progress | None = None) -> None:
         """Run all steps, or resume a stopped scan with the steps missing from its progress.
@@ -142,7 +144,7 @@ class Engine:
             return
         # An index of its own, so that a simulated scene draws new noise.
         step = replace(original, index=len(plan.steps) + len(progress.checks), preview=False)
-        self._devices.begin_step(step.index, progress.elapsed_s)
+        self._begin_step(step.index, progress.elapsed_s)
         self._place(step.surface)
         self._positioner.move_to(step.pose)
         elapsed_s = progress.elapsed_s
@@ -164,7 +166,7 @@ class Engine:
     def _scan(self, plan: Plan, steps: Sequence[Step]) -> None:
         waiting = None
         for step in steps:
-            self._devices.begin_step(step.index, self._exposer.scan_s())
+            self._begin_step(step.index, self._exposer.scan_s())
             if step.surface != self._positioner.surface:
                 self._accept(waiting)  # the operator may take their time, or give up
                 waiting = None
@@ -175,6 +177,15 @@ class Engine:
             self._positioner.finish_moves()
             waiting = self._expose(step)
         self._accept(waiting)
+
+    def _begin_step(self, index: int, scan_s: float) -> None:
+        self._begun_step = (index, scan_s, self._exposer.connected_s())
+        self._devices.begin_step(index, scan_s)
+
+    def _continue_step(self) -> None:
+        """Tell a simulated scene that waiting for a lost camera is no scan time."""
+        index, scan_s, begun_s = self._begun_step
+        self._devices.begin_step(index, scan_s + self._exposer.connected_s() - begun_s)
 
     def _place(self, surface: Surface) -> None:
         name = self._protocol.sample.name if surface == "sample" else "the white tile"

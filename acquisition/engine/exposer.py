@@ -65,7 +65,7 @@ class Exposer:
     def __post_init__(self) -> None:
         target = self.protocol.exposure_target
         self._search = ExposureSearch(self.camera, self.rig.camera, target)
-        self._check = ExposureCheck(self.rig.camera, self.clock, self._connected_s, self.record)
+        self._check = ExposureCheck(self.rig.camera, self.clock, self.connected_s, self.record)
 
     def restore(self, readings: Sequence[Reading]) -> None:
         """Take over from a stopped scan: brightness of the surfaces, and exposures with a dark."""
@@ -80,7 +80,7 @@ class Exposer:
 
     def start_clock(self, elapsed_s: float) -> None:
         """Start the scan time, at the duration so far."""
-        self._start_s = self._connected_s() - elapsed_s
+        self._start_s = self.connected_s() - elapsed_s
 
     def expose(self, step: Step, window: Window) -> Exposed:
         """Take all frames of a step, unsaturated if the camera's exposure range allows it."""
@@ -102,9 +102,9 @@ class Exposer:
 
         Waiting for a lost camera and checking exposures do not count either.
         """
-        return self._connected_s() - self._start_s - self._check.spent_s
+        return self.connected_s() - self._start_s - self._check.spent_s
 
-    def _connected_s(self) -> float:
+    def connected_s(self) -> float:
         """Return the time without that spent on waiting for a lost camera."""
         return self.clock.now_s() - self.camera.waited_s
 
@@ -127,11 +127,11 @@ class Exposer:
     def _dark(self, exposure_s: float) -> Dark:
         """Return the dark of an exposure; the scan time excludes darks repeated by a resume."""
         if exposure_s not in self._darks:
-            begun_s = self._connected_s()
+            begun_s = self.connected_s()
             asked_s = self._search.asked_s(exposure_s)
             self.take_darks((asked_s,))
             if exposure_s in self._used_before:
-                self._start_s += self._connected_s() - begun_s
+                self._start_s += self.connected_s() - begun_s
         if exposure_s not in self._darks:
             now_s = self._search.taken_s[asked_s]
             raise DeviceError(

@@ -22,11 +22,15 @@ class RetryingCamera:
 
     The loss is logged once and so is the return; both enter the record. The driver restores the
     settings of a camera that returns, or raises another error. A call is repeated as a whole: all
-    its frames are from one connection. `waited_s`: total time without a camera.
+    its frames are from one connection. `waited_s`: total time without a camera. `on_retry` is
+    called before each attempt.
     """
 
-    def __init__(self, camera: Camera, clock: Clock, reconnect_s: float) -> None:
+    def __init__(
+        self, camera: Camera, clock: Clock, reconnect_s: float, on_retry: Callable[[], None]
+    ) -> None:
         self._camera, self._clock, self._reconnect_s = camera, clock, reconnect_s
+        self._on_retry = on_retry
         self.waited_s = 0.0
 
     def set_exposure_s(self, exposure_s: float) -> float:
@@ -38,7 +42,7 @@ class RetryingCamera:
         return self._retry(lambda: self._camera.grab(count))
 
     def _retry(self, action: Callable[[], T]) -> T:
-        begun_s = self._clock.now_s()
+        begun_s, waited_s = self._clock.now_s(), self.waited_s
         try:
             return action()
         except CameraLost as error:
@@ -49,12 +53,13 @@ class RetryingCamera:
             self._clock.sleep(min(pause_s, left_s))
             pause_s = min(2 * pause_s, _LONGEST_PAUSE_S)
             away_s = self._clock.now_s() - begun_s
+            self.waited_s = waited_s + away_s
+            self._on_retry()
             try:
                 result = action()
             except CameraLost as error:
                 lost = error
                 continue
-            self.waited_s += away_s
             log.warning("camera: back after %.1f s, with its settings restored", away_s)
             return result
         raise CameraLost(f"{lost} (waited for {self._reconnect_s:g} s)") from lost

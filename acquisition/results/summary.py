@@ -12,7 +12,7 @@ from analysis.report.data import Parameter
 from analysis.report.style import format_value
 from instrument.config.load import Loaded
 from instrument.geometry import FloatArray
-from instrument.record.event_kinds import RESUMED, RETRY
+from instrument.record.event_kinds import EXPOSURE, RESUMED, RETRY
 from instrument.record.record import Record
 
 Budget = tuple[tuple[str, float, float], ...]
@@ -114,9 +114,23 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         _drift_note(reduced),
         _pull_note(fitted),
         _bits_note(reduced, fitted, loaded),
+        _exposure_note(reduced, record),
         "the white tile is assumed to be Lambertian" if reduced.shared_by_tile else "",
     )
     return tuple(note for note in found if note)
+
+
+def _exposure_note(reduced: Reduced, record: Record) -> str:
+    """Name the exposures that no comparison of counts has confirmed."""
+    found = [text for _, kind, text in record.events() if kind == EXPOSURE]
+    used = sorted({point.exposure_s for point in reduced.points})
+    bare = [f"{e:g} s" for e in used if not any(f" {e:g} s" in text for text in found)]
+    if not bare:
+        return ""
+    return (
+        f"exposures that no comparison of counts has confirmed (too bright or too dark): "
+        f"{', '.join(bare)}"
+    )
 
 
 def _hidden_note(record: Record) -> str:

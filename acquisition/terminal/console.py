@@ -61,14 +61,16 @@ class _Shown(logging.Handler):
 
 
 @contextmanager
-def warnings_shown(logger: str) -> Iterator[None]:
-    """Print what is logged under this name, within a `with` block: a person has to act on it."""
-    handler = _Shown(logging.WARNING)
-    logging.getLogger(logger).addHandler(handler)
+def warnings_shown(*names: str) -> Iterator[None]:
+    """Print what is logged under these names, within a `with` block: a person has to act on it."""
+    handler, loggers = _Shown(logging.WARNING), [logging.getLogger(name) for name in names]
+    for logger in loggers:
+        logger.addHandler(handler)
     try:
         yield
     finally:
-        logging.getLogger(logger).removeHandler(handler)
+        for logger in loggers:
+            logger.removeHandler(handler)
 
 
 def duration_text(seconds: float) -> str:

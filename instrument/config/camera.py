@@ -146,13 +146,13 @@ class CameraDefects(Section):
     true exposure, as of a camera that cannot expose longer than its frame period. `exposures_s`:
     table of true exposures; the one nearest to the exposure that is set is used. `reads_back`:
     exposure that the camera reports, the one set (like uvcvideo, which answers from its cache) or
-    the true one. `limited_range`: 8-bit counts have black at 16 and white at 235, and a YUYV camera
+    the one taken. `limited_range`: 8-bit counts have black at 16 and white at 235; a YUYV camera
     declares it to the driver or not.
     """
 
     fixed_exposure_s: Positive | None = None
     longest_exposure_s: Positive | None = None
     exposures_s: Annotated[list[Positive], Field(min_length=1)] | None = None
-    reads_back: Literal["set", "true"] = "set"
+    reads_back: Literal["set", "taken"] = "set"
     hot_pixels: list[HotPixel] = Field(default_factory=list)
     limited_range: Literal["none", "declared", "undeclared"] = "none"

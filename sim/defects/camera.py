@@ -25,7 +25,7 @@ def true_exposure_s(set_s: float, defects: CameraDefects) -> float:
 
 def read_back_s(set_s: float, defects: CameraDefects) -> float:
     """Return the exposure in seconds that the camera reports after it was set to `set_s`."""
-    return true_exposure_s(set_s, defects) if defects.reads_back == "true" else set_s
+    return true_exposure_s(set_s, defects) if defects.reads_back == "taken" else set_s
 
 
 def hot_electrons_per_s(shape: tuple[int, int], defects: CameraDefects) -> FloatArray | None:

@@ -7,6 +7,7 @@ light that does not flicker, enough to saturate it.
 from __future__ import annotations
 
 import os
+import runpy
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -121,8 +122,17 @@ def test_a_defective_camera_fails_the_contract(remote: RemoteCamera, kind: str) 
             CHECKS[check](remote, config)  # type: ignore[arg-type]  # a camera over a pipe
 
 
-def test_a_real_camera_needs_no_compiler(tmp_path: Path) -> None:
-    """The camera of the rig file is opened, and not there."""
+def test_no_test_of_a_camera_is_left_out_as_a_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a compiler only the emulated cameras are skipped."""
+    monkeypatch.setenv("PATH", "/nowhere")
+    runpy.run_path(str(ROOT / "tests" / "support" / "v4l2" / "remote_camera.py"))
+
+
+@pytest.mark.slow
+def test_a_real_camera_needs_no_compiler(tmp_path: Path, slow: bool) -> None:
+    """The camera of the rig file is opened, and not there; with --slow, in a process of its own."""
+    if not slow:
+        return
     rig = yaml.safe_load((CONFIGS / "rigs" / "emulated.yaml").read_text())
     hand = {"driver": "hand", "min_deg": 0.0, "max_deg": 80.0, "u_deg": 0.1}
     rig["axes"] = {name: dict(hand) for name in rig["axes"]}

@@ -48,7 +48,7 @@ def rig_file(folder: Path, camera: dict[str, object], defects: dict[str, object]
         ({}, {}),
         ({"min_exposure_s": 0.0001, "full_well_electrons": 10_000.0}, {}),
         ({"bit_depth": 8, "black_level_dn": 8.0, "read_noise_electrons": 60.0}, {}),
-        ({}, {"exposures_s": [0.0005 * 2**n for n in range(12)], "reads_back": "true"}),
+        ({}, {"exposures_s": [0.0005 * 2**n for n in range(12)], "reads_back": "taken"}),
     ],
 )
 def test_a_frame_is_exposed_by_itself(

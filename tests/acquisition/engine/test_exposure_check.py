@@ -79,7 +79,7 @@ def test_a_sound_camera_is_confirmed_at_every_exposure_that_the_scan_uses(
 @pytest.mark.parametrize("step_s", [0.0016, 0.005])
 def test_a_rounded_exposure_that_is_confirmed_is_used(new_record: Record, step_s: float) -> None:
     table = [step_s * n for n in range(1, 1000)]
-    loaded = grey_card({"exposures_s": table, "reads_back": "true"})
+    loaded = grey_card({"exposures_s": table, "reads_back": "taken"})
     scan(loaded, new_record)
     used = {r.exposure_s for r in new_record.readings()}
     assert used <= set(table)

@@ -29,7 +29,7 @@ class Away:
 
 
 def waiting(camera: Away, reconnect_s: float) -> RetryingCamera:
-    return RetryingCamera(camera, camera.clock, reconnect_s)  # type: ignore[arg-type]  # a stand-in
+    return RetryingCamera(camera, camera.clock, reconnect_s, lambda: None)  # type: ignore[arg-type]  # a stand-in
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])

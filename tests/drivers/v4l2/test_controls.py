@@ -67,7 +67,7 @@ def test_an_exposure_that_the_camera_rounds_is_used_as_it_was_read_back(
     remote: RemoteCamera, scene: LevelScene
 ) -> None:
     """Exposures in factors of two, as of webcams: 60 and 61 ms become 62.5 ms."""
-    table = CameraDefects(exposures_s=[0.0156, 0.0312, 0.0625, 0.125], reads_back="true")
+    table = CameraDefects(exposures_s=[0.0156, 0.0312, 0.0625, 0.125], reads_back="taken")
     with served(remote, scene, defects=table):
         remote.ask("open", replace(SETTINGS, min_exposure_s=0.02))
         remote.ask("said")

@@ -62,3 +62,15 @@ def test_full_scale_of_the_limited_range_is_235() -> None:
     )  # fmt: skip
     assert (full.max_dn, limited.max_dn) == (255, 235)
     assert limited.electrons_per_dn == pytest.approx(10_000 / (235 - 16))
+
+
+def test_a_hot_pixel_outside_the_image_is_refused() -> None:
+    """The image has 320 rows and 640 columns."""
+    pixel = "{{row: {}, column: {}, electrons_per_s: 100.0}}"
+    pixels = ", ".join(pixel.format(*at) for at in ((319, 639), (320, 1), (1, 640)))
+    rig = RIG + f"simulation: {{camera_defects: {{hot_pixels: [{pixels}]}}}}\n"
+    found = problems(rig=rig)
+    assert len(found) == 2
+    for place in ("row 320, column 1", "row 1, column 640"):
+        text = f"hot pixel in {place}; allowed: rows up to 319, columns up to 639"
+        assert any(problem.endswith(text) for problem in found)

@@ -27,7 +27,7 @@ from tests.support.scans import changed, simulated_scene, small_scan
     ],
 )
 def test_the_true_exposure_and_the_one_reported(defects: dict[str, Any], true_s: float) -> None:
-    for reads_back, reported_s in (("set", 0.05), ("true", true_s)):
+    for reads_back, reported_s in (("set", 0.05), ("taken", true_s)):
         camera = CameraDefects.model_validate({**defects, "reads_back": reads_back})
         assert true_exposure_s(0.05, camera) == true_s
         assert read_back_s(0.05, camera) == reported_s

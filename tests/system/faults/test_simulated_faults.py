@@ -203,7 +203,12 @@ def test_an_unanswered_prompt(
 @pytest.mark.parametrize("state", ["exposing", "reading"])
 @pytest.mark.parametrize("tries", [1, 3, 25])
 def test_a_camera_that_returns(
-    small: Loaded, sound: SoundScan, tmp_path: Path, state: str, tries: int
+    small: Loaded,
+    sound: SoundScan,
+    tmp_path: Path,
+    state: str,
+    tries: int,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """Plugged in again while the engine waits: one event at the loss, one at the return."""
     _, call, number = sound.states[state]
@@ -216,6 +221,9 @@ def test_a_camera_that_returns(
     lost, back = result.events["retry"]
     assert lost.startswith("camera: not found")
     assert back.startswith("camera: back after")
+    shown = "".join(capsys.readouterr().err.split())
+    assert "".join(lost.split()) in shown  # the person at the rig sees both
+    assert "".join(back.split()) in shown
 
 
 @pytest.mark.parametrize("name", ["theta_i", "dphi", "theta_r"])
