@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, settings
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from instrument.config.load import Loaded, load_protocol
+from tests.support import standstill
 from tests.support.paths import CONFIGS
 
 if TYPE_CHECKING:
@@ -44,6 +45,21 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if item.get_closest_marker("hil"):
             item.add_marker(refused)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
+    """A test in real time that failed while the machine stood still is repeated."""
+    if not standstill.is_repeated(item):
+        return None
+    standstill.run_in_real_time(item, nextitem)
+    return True
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    reports = [r for kind in ("passed", "failed") for r in terminalreporter.getreports(kind)]
+    for line in standstill.repetitions(reports):
+        terminalreporter.write_line(line)
 
 
 @pytest.fixture(scope="module")

@@ -32,6 +32,8 @@ from tests.support.scans import simulated_scene, small_scan
 from tests.support.v4l2.camera_contract import CHECKS, Check
 from tests.support.v4l2.remote_camera import DEVICE, QUICK, RemoteCamera, child, served
 
+pytestmark = pytest.mark.real_time
+
 Tested = tuple[Camera, CameraConfig]
 WIDTH, HEIGHT = 64, 48
 

@@ -21,9 +21,12 @@ from tests.support.command import gonio, gonio_here
 from tests.support.paths import CONFIGS, ROOT
 from tests.support.scans import small_demo
 
-pytestmark = pytest.mark.skipif(
-    shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"
-)
+pytestmark = [
+    pytest.mark.real_time,
+    pytest.mark.skipif(
+        shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"
+    ),
+]
 RIG = CONFIGS / "rigs" / "emulated.yaml"
 TRUTH = {"albedo": 0.80, "sigma_deg": 20.0, "ks": 0.076}
 

@@ -10,6 +10,8 @@ import pytest
 from tests.support.paths import ROOT
 from tests.support.stages.emulated_stages import EMULATED_STAGES
 
+pytestmark = pytest.mark.real_time
+
 # On a half-duplex line a reply may be pending: one reply time-out more.
 BOUND_S = {"newport": 0.1, "zaber": 0.1, "oriental rtu": 0.3, "oriental tcp": 0.3}
 CAUSES = {"SIGINT": "KeyboardInterrupt", "SIGTERM": "KeyboardInterrupt", "exception": "DeviceError"}

@@ -28,6 +28,8 @@ from tests.support.v4l2.remote_camera import (
     wait_for,
 )
 
+pytestmark = pytest.mark.real_time
+
 
 def test_identity_states_card_driver_bus_and_image_format(
     remote: RemoteCamera, scene: LevelScene

@@ -23,6 +23,8 @@ from tests.support.v4l2.remote_camera import (
     steps,
 )
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.mark.parametrize("exposure_s", [0.001, 0.5])
 @pytest.mark.parametrize(

@@ -23,6 +23,8 @@ from tests.support.v4l2.remote_camera import (
     served,
 )
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.mark.parametrize("request_name", ["DQBUF", "QBUF", "QUERYBUF", "G_CTRL"])
 @pytest.mark.parametrize("error", [errno.EIO, errno.EINVAL])

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from drivers.v4l2.frame_filter import FrameFilter
 
+pytestmark = pytest.mark.real_time
+
 exposures = st.floats(1e-4, 5.0)
 
 

@@ -26,6 +26,8 @@ from tests.support.v4l2.remote_camera import (
     served,
 )
 
+pytestmark = pytest.mark.real_time
+
 
 def fault(**values: Any) -> Callable[[CameraFaults], None]:
     def apply(faults: CameraFaults) -> None:

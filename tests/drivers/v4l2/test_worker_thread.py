@@ -21,6 +21,8 @@ from tests.support.v4l2.remote_camera import (
     wait_for,
 )
 
+pytestmark = pytest.mark.real_time
+
 
 def test_a_hung_driver_blocks_nobody(remote: RemoteCamera, scene: LevelScene) -> None:
     """The device model answers no DQBUF any more; after a while it does again."""
