@@ -125,9 +125,12 @@ def _controller(axis: Wired, motor: Motor) -> Controller:
 
 def _capabilities(camera: V4l2CameraConfig, defects: CameraDefects) -> Capabilities:
     frames_per_s = camera.frames_per_s or _FRAMES_PER_S
+    limited = camera.luma_range == "limited"
+    if limited:  # the rig file's sensor has these counts already
+        defects = defects.model_copy(update={"limited_range": "none"})
     return Capabilities(
         defects=defects,
-        quantization=LIMITED_RANGE if camera.luma_range == "limited" else FULL_RANGE,
+        quantization=LIMITED_RANGE if limited else FULL_RANGE,
         formats=(camera.pixel_format,),
         sizes=((camera.width_px, camera.height_px),),
         frames_per_s=frames_per_s,

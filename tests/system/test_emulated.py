@@ -171,6 +171,29 @@ def test_grab_takes_a_frame_with_the_emulated_camera(tmp_path: Path) -> None:
     assert json.loads(done.stdout)["window_mean_dn"] > 200
 
 
+@pytest.mark.parametrize("luma_range", ["full", "limited"])
+def test_white_of_a_limited_range_is_saturated_or_the_camera_refused(
+    tmp_path: Path, luma_range: str
+) -> None:
+    rig = yaml.safe_load(RIG.read_text())
+    rig["camera"] |= {
+        "pixel_format": "YUYV", "bit_depth": 8, "black_level_dn": 20.0,
+        "read_noise_electrons": 60.0, "luma_range": luma_range,
+    }  # fmt: skip
+    rig["simulation"]["camera_defects"] = {"limited_range": "declared"}
+    path = tmp_path / "rig.yaml"
+    path.write_text(yaml.safe_dump(rig))
+    done = gonio("grab", "--rig", path, "-o", tmp_path / "aim.png", "--exposure-s", "0.1", "--json")
+    if luma_range == "full":
+        assert done.returncode == 3
+        assert "its YUYV has limited range: black is 16 and white 235" in done.stderr
+        return
+    found = json.loads(done.stdout)
+    assert (found["frame_max_dn"], found["full_scale_dn"]) == (235, 235)
+    assert found["saturated_pixels"] > 1000
+    assert "pixels are saturated (at 235 DN" in done.stderr
+
+
 def test_move_homes_and_moves_an_emulated_axis() -> None:
     done = gonio("move", "dphi", "30", "--rig", RIG)
     assert done.returncode == 0, done.stderr

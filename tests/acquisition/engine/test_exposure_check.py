@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from acquisition.engine.exposure_check import ExposureCheck
+from acquisition.measure.linearity import LEAST_RATIO
 from acquisition.plan.exposure_ladder import exposure_ladder_s
 from acquisition.results.reduction import reduced_run
 from acquisition.rig import open_devices
@@ -17,10 +20,12 @@ from instrument.config.load import Loaded
 from instrument.config.protocol import SimulatedSample
 from instrument.errors import DeviceError
 from instrument.record.record import Record
+from sim.clock import SimulatedClock
 from tests.support.scans import changed, small_scan
 from tests.support.stopped_scan import scan
 
 GREY = 0.18
+CAMERA = small_scan().rig.camera
 
 
 def grey_card(defects: dict[str, Any], rig: str = "bench_12bit", seed: int = 2026) -> Loaded:
@@ -87,6 +92,26 @@ def test_a_rounded_exposure_that_is_confirmed_is_used(new_record: Record, step_s
     assert {dark[0] for dark in new_record.darks()} == used
     reduced = reduced_run(new_record, loaded)
     assert reduced.brdf * 3.14159265 == pytest.approx(GREY, rel=0.03)
+
+
+@given(
+    rungs=st.lists(st.integers(0, 22), min_size=1, max_size=60), overhead_s=st.floats(0.0, 0.3),
+    takes=st.floats(0.1, 4.0),
+)  # fmt: skip
+def test_no_sequence_of_exposures_costs_more(
+    rungs: list[int], overhead_s: float, takes: float
+) -> None:
+    """Nothing is ever confirmed; a frame takes up to four exposures and read-outs."""
+    camera = CAMERA.model_copy(update={"frame_overhead_s": overhead_s})
+    ladder, clock = exposure_ladder_s(camera), SimulatedClock()
+    check = ExposureCheck(camera, clock, clock.now_s, None)  # type: ignore[arg-type]  # not written to
+    for exposure_s in (ladder[rung] for rung in rungs):
+        shorter_s = check.comparison_s(exposure_s)
+        if shorter_s is not None:
+            assert shorter_s <= exposure_s / LEAST_RATIO
+            with check.timed():
+                clock.sleep(takes * (shorter_s + overhead_s))
+    assert check.spent_s <= 2 + 2 * max(ladder[rung] for rung in rungs)
 
 
 @pytest.mark.parametrize("albedo", [0.9, 0.02])
