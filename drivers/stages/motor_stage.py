@@ -90,6 +90,7 @@ class MotorStage(ABC):
 
     def homed(self) -> bool:
         """True if the controller knows its reference, read once the stage is at rest."""
+        self.watchdog.finish_stop()
         return self._wait_for_rest(self.status()).homed
 
     def _wait_for_rest(self, now: Status) -> Status:
@@ -109,6 +110,7 @@ class MotorStage(ABC):
 
     def _status_before_motion(self) -> Status:
         """Return the status at rest; refuse a stage that is still executing a move."""
+        self.watchdog.finish_stop()
         now = self.status()
         if now.moving and not self._stopped:
             raise DeviceError(

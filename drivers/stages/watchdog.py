@@ -52,6 +52,7 @@ class Watchdog:
         self._over.set()
         self._answered_s = 0.0
         self._meter = PauseMeter(clock)
+        self._thread: threading.Thread | None = None
         self.fired, self.paused_s = False, 0.0
 
     def begin(self) -> None:
@@ -60,9 +61,15 @@ class Watchdog:
         self.fired, self.paused_s, self._answered_s = False, 0.0, self._clock.now_s()
         self._over = threading.Event()
         self._meter.begin(self._over)
-        threading.Thread(
+        self._thread = threading.Thread(
             target=self._watch, args=(self._over,), name=f"watchdog {self._name}", daemon=True
-        ).start()
+        )
+        self._thread.start()
+
+    def finish_stop(self) -> None:
+        """Wait until a stop that has begun is sent: it must not end the next motion."""
+        if self.fired and self._thread is not None:
+            self._thread.join()
 
     def end(self) -> None:
         """Stop watching: the motion has ended, or was told to."""

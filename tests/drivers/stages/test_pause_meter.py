@@ -39,17 +39,22 @@ class PausingClock(SystemClock):
 
 
 class PausedInACommand:
-    """Line on which the computer pauses while a command is under way; returns once it was noted."""
+    """Line on which the computer pauses while a command is under way; answers once it was noted.
+
+    `lost`: that answer never comes.
+    """
 
     def __init__(self, controller: Controller, clock: PausingClock) -> None:
         self._controller, self._clock = controller, clock
-        self.command, self.noted = b"-", threading.Event()
+        self.command, self.noted, self.lost = b"-", threading.Event(), False
 
     def answer(self, data: bytes) -> bytes:
         if self.command in data:
             self.command = b"-"
             self._clock.pause()
             assert self.noted.wait(5)
+            answer = self._controller.answer(data)
+            return b"" if self.lost else answer
         return self._controller.answer(data)
 
 
@@ -120,7 +125,7 @@ def test_a_pause_while_the_move_is_sent_is_named(setup: Setup, command: bytes) -
 @pytest.mark.parametrize("setup", ["oriental rtu"], indirect=True)
 def test_answers_that_are_lost_in_a_pause_are_no_fault_of_the_line(setup: Setup) -> None:
     """The drive's registers cannot be asked in time whether it has taken the move."""
-    setup.line.command = b"\x10\x00\x58"
+    setup.line.command, setup.line.lost = b"\x10\x00\x58", True
     watchdog = setup.stage.watchdog
 
     def much_later() -> None:
@@ -132,6 +137,23 @@ def test_answers_that_are_lost_in_a_pause_are_no_fault_of_the_line(setup: Setup)
     with pytest.raises(ComputerPaused, match=r"theta_r: .*the computer paused for 1.3 s"):
         setup.stage.start_move(70.0)
     assert setup.moves_on()
+
+
+@pytest.mark.parametrize("setup", ["newport"], indirect=True)
+def test_the_watchdogs_stop_does_not_end_the_next_move(
+    setup: Setup, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stop may have to wait for the line or for its port; nothing moves on before it is sent."""
+    may_send, send = threading.Event(), setup.stage._send_stop
+    monkeypatch.setattr(setup.stage, "_send_stop", lambda: (may_send.wait(5), send()))
+    paused_under_way(setup)
+    going_on = threading.Thread(target=setup.stage.start_move, args=(2.0,))
+    going_on.start()
+    wait_until(lambda: setup.motor.position_deg > 35.0)  # it is stopped late here
+    assert setup.moves() == 1
+    may_send.set()
+    going_on.join(timeout=5)
+    assert setup.stage.wait() == pytest.approx(2.0, abs=1e-2)
 
 
 @pytest.mark.parametrize("setup", ["newport"], indirect=True)
