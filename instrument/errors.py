@@ -38,6 +38,10 @@ class ComputerPaused(DeviceError):
     """
 
 
+class WrongRigFile(DeviceError):
+    """Device that cannot do what the rig file says: a run with this file cannot be resumed."""
+
+
 class CameraLost(DeviceError):
     """Camera is gone or sends no frames; the next call to it searches for it and reopens it."""
 

@@ -13,7 +13,7 @@ from acquisition.terminal.console import console, duration_text, warnings_shown
 from acquisition.terminal.progress import scan_progress
 from instrument.clock import Clock, SystemClock
 from instrument.config.load import Loaded
-from instrument.errors import DeviceError, OperatorStop, StorageError
+from instrument.errors import DeviceError, OperatorStop, StorageError, WrongRigFile
 from instrument.record.event_kinds import FAULT, FINISHED, STOPPED
 from instrument.record.record import Record
 
@@ -36,10 +36,11 @@ def scan(loaded: Loaded, plan: Plan, record: Record, progress: Progress | None =
             why = str(stop) or "stopped by the operator"
             _record_end(record, log, clock, STOPPED, why)
             ended = "" if log.troubles else ": all motion has ended."
-            raise OperatorStop(f"{why}{ended} {_how_to_resume(record, log)}") from None
+            raise OperatorStop(f"{why}{ended} {_how_to_go_on(record, log)}") from None
         except (DeviceError, StorageError) as error:
             _record_end(record, log, clock, FAULT, str(error))
-            raise type(error)(f"{error}\n{_how_to_resume(record, log)}") from error
+            rest = _how_to_go_on(record, log, resume=not isinstance(error, WrongRigFile))
+            raise type(error)(f"{error}\n{rest}") from error
         except Exception as error:
             _record_end(record, log, clock, FAULT, f"the program failed: {error!r}")
             raise
@@ -84,13 +85,17 @@ def _record_end(record: Record, log: EventLogHandler, clock: Clock, kind: str, w
         return
 
 
-def _how_to_resume(record: Record, log: EventLogHandler) -> str:
-    """Return the state of the rig, the readings that are safe, and the command to resume."""
+def _how_to_go_on(record: Record, log: EventLogHandler, *, resume: bool = True) -> str:
+    """Return the state of the rig, the readings that are safe, and the command to continue with.
+
+    Without `resume` the run cannot be continued: it keeps the rig file that was wrong.
+    """
     folder = record.current_folder()
     if folder is None:
         return f"{_warnings(log)}The run's folder is gone: nothing is left to resume"
     safe = f"{len(record.readings())} readings are safe in {folder}"
-    return f"{_warnings(log)}{safe}. Go on with: gonio resume {folder}"
+    new_run = "Correct the rig file, then start a new run"
+    return f"{_warnings(log)}{safe}. {f'Go on with: gonio resume {folder}' if resume else new_run}"
 
 
 def _warnings(log: EventLogHandler) -> str:

@@ -19,7 +19,7 @@ from acquisition.plan.exposure_ladder import longest_exposure_s
 from instrument.clock import Clock
 from instrument.config.camera import CameraConfig
 from instrument.devices import Frame
-from instrument.errors import DeviceError
+from instrument.errors import WrongRigFile
 from instrument.record.event_kinds import EXPOSURE
 from instrument.record.record import Record
 
@@ -77,7 +77,7 @@ class ExposureCheck:
     ) -> None:
         """Compare frames with those `tried` before at other exposures; the camera must agree.
 
-        Raises `DeviceError` if the counts contradict the exposures. What was found is recorded.
+        Raises `WrongRigFile` if the counts contradict the exposures. What was found is recorded.
         """
         exposure_s = frames[0].exposure_s
         if exposure_s in self.confirmed:
@@ -93,9 +93,9 @@ class ExposureCheck:
             self.record.add_event(self.clock.utc().isoformat(), EXPOSURE, best.text())
 
 
-def _disbelief(found: Proportion) -> DeviceError:
-    return DeviceError(
+def _disbelief(found: Proportion) -> WrongRigFile:
+    return WrongRigFile(
         f"camera: {found.text()}: it does not expose as long as it says (limited by its frame "
         "rate, in coarse steps, or automatic), or the lamp flickers; allow only exposures that it "
-        "makes (min_exposure_s, max_exposure_s), or lower frames_per_s, and start a new run"
+        "makes (min_exposure_s, max_exposure_s), or lower frames_per_s, in the rig file"
     )

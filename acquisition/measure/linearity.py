@@ -16,7 +16,7 @@ from acquisition.measure.radiometry import SATURATION_FRACTION, Dark, Signal, me
 from acquisition.measure.window import Window
 from instrument.config.camera import CameraConfig
 from instrument.devices import Frame
-from instrument.errors import DeviceError
+from instrument.errors import WrongRigFile
 
 LARGEST_DEVIATION = 0.02  # of the ratio of counts from that of exposures, beyond 4 u
 LARGEST_U = 0.01  # relative: a ratio less certain than this proves nothing
@@ -129,7 +129,7 @@ def dark_at(
 
 
 def require_possible_times(frames: Sequence[Frame]) -> None:
-    """Raise `DeviceError` if frames of one exposure follow one another faster than they can.
+    """Raise `WrongRigFile` if frames of one exposure follow one another faster than they can.
 
     A pixel cannot be exposed twice at a time. Frames without a time stamp prove nothing.
     """
@@ -139,8 +139,8 @@ def require_possible_times(frames: Sequence[Frame]) -> None:
     gaps, exposure_s = len(stamps) - 1, min(frame.exposure_s for frame in frames)
     period_s = (stamps[-1] - stamps[0]) / gaps
     if period_s < _SHARE * exposure_s - _JITTER_S / gaps:
-        raise DeviceError(
+        raise WrongRigFile(
             f"camera: its frames come every {period_s:.3g} s, but each is said to be exposed for "
             f"{exposure_s:g} s: it does not expose longer than its frame period; lower "
-            f"max_exposure_s to {period_s:.3g} s, or frames_per_s, and start a new run"
+            f"max_exposure_s to {period_s:.3g} s, or frames_per_s, in the rig file"
         )

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from drivers.v4l2 import ioctl
 from drivers.v4l2.settings import BUFFERS, V4l2Settings
-from instrument.errors import CameraLost, DeviceError
+from instrument.errors import CameraLost, WrongRigFile
 
 if TYPE_CHECKING:
     from cv2 import VideoCapture
@@ -46,7 +46,7 @@ def require_pictures(found: ioctl.Capability, device: str, who: str) -> None:
         return
     first = device.removesuffix("-video-index1") + "-video-index0"
     advice = first if device.endswith("-video-index1") else "one that `gonio devices` lists"
-    raise DeviceError(f"{who}: this node is {found.purpose}; name {advice} in the rig file")
+    raise WrongRigFile(f"{who}: this node is {found.purpose}; name {advice} in the rig file")
 
 
 def open_video(settings: V4l2Settings, control: int, who: str) -> tuple[VideoCapture, int | None]:
@@ -92,13 +92,13 @@ def _check_format(video: VideoCapture, settings: V4l2Settings, control: int, who
     found = ioctl.current_format(control)
     if found.name != settings.pixel_format:
         offered = ", ".join(ioctl.formats(control))
-        raise DeviceError(
+        raise WrongRigFile(
             f"{who}: format {settings.pixel_format} asked for, the camera took {found.name}; "
             f"it offers {offered}; change pixel_format"
         )
     _check_size(found, settings, control, who)
     if video.get(cv2.CAP_PROP_CONVERT_RGB) != 0:
-        raise DeviceError(
+        raise WrongRigFile(
             f"{who}: OpenCV would convert {found.name} to 8-bit colour; use OpenCV 4.14 or later"
         )
     _check_range(found, settings, who)
@@ -109,12 +109,12 @@ def _check_range(found: ioctl.Format, settings: V4l2Settings, who: str) -> None:
     if found.limited_range == settings.limited_range:
         return
     if found.limited_range:
-        raise DeviceError(
+        raise WrongRigFile(
             f"{who}: its {found.name} has limited range: black is 16 and white 235, so counts "
             "never come to 255 and saturation would not be seen; write luma_range: limited and a "
             "black_level_dn of at least 16 in the rig file, or use another pixel_format"
         )
-    raise DeviceError(
+    raise WrongRigFile(
         f"{who}: its {found.name} has the full range, 0 to 255, but the rig file says luma_range: "
         "limited; remove that entry"
     )
@@ -123,13 +123,13 @@ def _check_range(found: ioctl.Format, settings: V4l2Settings, who: str) -> None:
 def _check_size(found: ioctl.Format, settings: V4l2Settings, control: int, who: str) -> None:
     if (found.width_px, found.height_px) != (settings.width_px, settings.height_px):
         offered = ", ".join(ioctl.sizes(control, found.name))
-        raise DeviceError(
+        raise WrongRigFile(
             f"{who}: size {settings.width_px} x {settings.height_px} pixels asked for, the camera "
             f"took {found.width_px} x {found.height_px}; it offers {offered}; "
             "change width_px and height_px"
         )
     if found.bytes_per_line != settings.bytes_per_line:
-        raise DeviceError(
+        raise WrongRigFile(
             f"{who}: a row has {found.bytes_per_line} bytes, {settings.bytes_per_line} of them "
             "pixels: OpenCV would shear the image; choose another width_px"
         )
@@ -138,7 +138,7 @@ def _check_size(found: ioctl.Format, settings: V4l2Settings, control: int, who: 
 def _check_rate(settings: V4l2Settings, control: int, who: str) -> None:
     asked, period_s = settings.frames_per_s, ioctl.frame_period_s(control)
     if asked is not None and period_s is not None and period_s > 1.01 / asked:
-        raise DeviceError(
+        raise WrongRigFile(
             f"{who}: {asked} frames a second asked for, the camera took {1 / period_s:g}; "
             "change frames_per_s or the size"
         )
