@@ -17,8 +17,12 @@ from instrument.errors import DeviceError, OperatorStop, StorageError, WrongRigF
 from instrument.record.event_kinds import FAULT, FINISHED, STOPPED
 from instrument.record.record import Record
 
-# Loggers of what the scan waits for, so that a person can help: the record, a lost camera.
-_TO_BE_SEEN = ("instrument.record", "acquisition.engine.retrying_camera")
+# Loggers of what a person can help with: a record or a camera that is waited for, an exposure.
+_TO_BE_SEEN = (
+    "instrument.record",
+    "acquisition.engine.retrying_camera",
+    "acquisition.engine.exposure_check",
+)
 
 
 def scan(loaded: Loaded, plan: Plan, record: Record, progress: Progress | None = None) -> None:

@@ -7,12 +7,13 @@ first.
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from acquisition.measure.linearity import LEAST_RATIO, Proportion, proportion
+from acquisition.measure.linearity import LEAST_RATIO, NOTABLE_DEVIATION, Proportion, proportion
 from acquisition.measure.radiometry import Dark
 from acquisition.measure.window import Window
 from acquisition.plan.exposure_ladder import longest_exposure_s
@@ -22,6 +23,8 @@ from instrument.devices import Frame
 from instrument.errors import WrongRigFile
 from instrument.record.event_kinds import EXPOSURE
 from instrument.record.record import Record
+
+log = logging.getLogger(__name__)
 
 ALLOWED_S, ALLOWED_EXPOSURES = 2.0, 2.0  # extra time a scan: 2 s and twice its longest exposure
 _LONG_S = 0.1  # a longer exposure is compared with an eighth of it, a shorter one with a quarter
@@ -91,6 +94,9 @@ class ExposureCheck:
         if best is not None and best.confirms:
             self.confirmed |= {best.shorter_s, best.longer_s}
             self.record.add_event(self.clock.utc().isoformat(), EXPOSURE, best.text())
+            if best.deviation > NOTABLE_DEVIATION:
+                text = "camera: %s: values measured at different exposures may differ by as much"
+                log.warning(text, best.text())
 
 
 def _disbelief(found: Proportion) -> WrongRigFile:

@@ -19,6 +19,7 @@ from instrument.devices import Frame
 from instrument.errors import WrongRigFile
 
 LARGEST_DEVIATION = 0.02  # of the ratio of counts from that of exposures, beyond 4 u
+NOTABLE_DEVIATION = 0.005  # of the same ratio, beyond 4 u
 LARGEST_U = 0.01  # relative: a ratio less certain than this proves nothing
 LEAST_RATIO = 1.3  # of two exposures: closer ones would agree whatever the camera did
 _COVERAGE = 4.0
@@ -46,10 +47,14 @@ class Proportion:
         return self.longer_s / self.shorter_s
 
     @property
+    def deviation(self) -> float:
+        """Relative deviation of the ratio of counts from that of exposures, 4 u taken off."""
+        return max(abs(self.ratio / self.expected - 1) - _COVERAGE * self.u_relative, 0.0)
+
+    @property
     def contradicts(self) -> bool:
         """True if the counts cannot be those of these exposures."""
-        allowed = LARGEST_DEVIATION + _COVERAGE * self.u_relative
-        return abs(self.ratio / self.expected - 1) > allowed
+        return self.deviation > LARGEST_DEVIATION
 
     @property
     def confirms(self) -> bool:

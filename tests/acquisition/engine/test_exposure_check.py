@@ -81,6 +81,17 @@ def test_a_sound_camera_is_confirmed_at_every_exposure_that_the_scan_uses(
         assert any(f"{exposure_s:g} s" in text for text in texts), exposure_s
 
 
+@pytest.mark.parametrize(("error", "warned"), [(0.0, False), (0.003, False), (0.012, True)])
+def test_a_small_deviation_is_a_warning(
+    new_record: Record, caplog: pytest.LogCaptureFixture, error: float, warned: bool
+) -> None:
+    """Exposures above 20 ms are longer than the camera says."""
+    ladder = exposure_ladder_s(CAMERA)
+    table = [e * (1 + error * (e > 0.02)) for e in ladder]
+    scan(grey_card({"exposures_s": table}), new_record)
+    assert any("may differ by as much" in text for text in caplog.messages) == warned
+
+
 @pytest.mark.parametrize("step_s", [0.0016, 0.005])
 def test_a_rounded_exposure_that_is_confirmed_is_used(new_record: Record, step_s: float) -> None:
     table = [step_s * n for n in range(1, 1000)]
