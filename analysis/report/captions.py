@@ -63,7 +63,7 @@ def shape_caption(data: ReportData, sweeps: Sweeps, quantity: str) -> str:
     what = (
         "Radiance relative to its value along the sample’s normal (θᵣ = 0)"
         if axis is VIEW
-        else quantity
+        else quantity[:1].upper() + quantity[1:]
     )
     caption = [
         f"{what}, against the {axis.name}. Error bars: standard uncertainty u (k = 1), often "
@@ -75,6 +75,11 @@ def shape_caption(data: ReportData, sweeps: Sweeps, quantity: str) -> str:
         caption.append(f"▼ marks the {fixed}.")
     if axis.side and any(not s.in_plane for s in sweeps):
         caption.append(f"Δφ is the azimuth of positive {axis.symbol} from the {axis.side}.")
+    if axis is not VIEW and not data.has_brdf:
+        caption.append(
+            "Without a white tile the fit takes the lamp’s level at each of its settings as "
+            "unknown: a deviation that follows the lamp is no misfit."
+        )
     return " ".join([*caption, *_model_captions(data), *_thinned(sweeps), _marker_caption(data)])
 
 

@@ -96,7 +96,7 @@ def _name(raw: str, joints: str = "+/") -> str:
 
 def _value_of(parameter: Parameter) -> str:
     if parameter.u is None and parameter.interval is not None:
-        low, high = (_number(end, ".4g") for end in parameter.interval)
+        low, high = (short_number(end, 4) for end in parameter.interval)
         unit = f"\u00a0{parameter.unit}" if parameter.unit else ""
         return escaped(f"not determined, in [{low}, {high}]{unit}")
     return escaped(format_value(parameter.value, parameter.u, parameter.unit))

@@ -54,7 +54,8 @@ def _head(result: BenchmarkResult) -> str:
 def _figure(svg: str, caption: str, attributes: str = "") -> str:
     """Return an SVG with its caption, which keeps its line breaks."""
     lines = "<br>".join(escape(line) for line in caption.splitlines())
-    return f"<figure{attributes}>{svg}<figcaption>{lines}</figcaption></figure>"
+    chart = f'<div class="chart">{svg}</div>'
+    return f"<figure{attributes}>{chart}<figcaption>{lines}</figcaption></figure>"
 
 
 def _study(study: Study) -> str:

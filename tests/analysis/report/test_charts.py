@@ -49,6 +49,7 @@ def test_a_moving_lamp_is_drawn_against_its_angle(tile: bool) -> None:
     assert "lamp angle θᵢ (°), on the camera’s side" in shown
     assert "camera 45°" in shown  # where lamp and camera meet
     assert "lamp at" not in shown
+    assert ("lamp’s level at each of its settings as unknown" in shown) != tile
     assert "lamp angle θᵢ from 0° to 75°" in report_html(data)
 
 

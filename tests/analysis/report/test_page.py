@@ -13,7 +13,7 @@ import pytest
 
 from analysis.report.data import Parameter, ReportData
 from analysis.report.page import report_html, write_report
-from analysis.report.style import format_value
+from analysis.report.style import CSS, format_value
 from instrument.errors import StorageError
 from instrument.geometry import FloatArray
 from instrument.record.reading import Preview
@@ -66,6 +66,22 @@ class TestPage:
         assert page.count("20.013 ± 0.021\u00a0°") == 2  # in the verdict and in the table
         assert "not determined, in [0, 0.123]" in page
         assert ">692.0<" in page
+
+    def test_on_a_phone_each_number_of_a_candidate_has_the_name_of_its_column(
+        self, page: str
+    ) -> None:
+        """The style sheet names columns 3 to 5, whose head is not shown there."""
+        table = page[page.index('<div class="wide candidates">') :]
+        head = re.findall(r"<th[^>]*>([^<]*)</th>", table)[:5]
+        named = re.findall(r"\.candidates td(\S*)::before {[^}]*content: \"([^\"]*) \"", CSS)
+        assert named == [(".number", "rms"), (":nth-child(4)", "χ²/dof"), (":nth-child(5)", "ΔBIC")]
+        assert head[2:] == ["Residual, rms", "Reduced χ²", "ΔBIC"]
+
+    def test_long_names_may_wrap(self) -> None:
+        model = replace(data_of().candidates[1], name="oren_nayar+torrance_sparrow")
+        page = report_html(data_of(verdict=(f"{model.name}: best",), candidates=(model,)))
+        assert "oren_<wbr>nayar+<wbr>torrance_<wbr>sparrow: best" in page
+        assert "<td>oren_nayar+<wbr>torrance_sparrow" in page
 
     def test_an_empty_report_has_few_sections(self) -> None:
         none = np.array([])
