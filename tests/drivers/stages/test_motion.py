@@ -8,10 +8,10 @@ import pytest
 
 from instrument.errors import DeviceError
 from instrument.kinematics import Trapezoid
-from tests.support.stages.kinds import KINDS
 from tests.support.stages.memory_stages import LIMITS, MECHANICS, MemoryStage, in_memory
 
-ANGLES_DEG = {(20.0, 40.0): 40.0, (5.0, 400.0): 10.0, (100.0, 15.0): 30.0}  # each about 2.5 s
+KINDS = ("newport", "zaber", "oriental rtu")
+ANGLES_DEG = {(20.0, 40.0): 15.0, (5.0, 400.0): 6.0, (100.0, 15.0): 7.0}  # each about 1.3 s
 ANGLE_DEG = ANGLES_DEG[20.0, 40.0]
 
 
@@ -38,8 +38,8 @@ def memory(
         ((20.0, 40.0), 2.0, "too fast"),
         ((5.0, 400.0), 1.2, "too fast"),
         ((100.0, 15.0), 1.5, "too fast"),
-        ((20.0, 40.0), 0.6, "too slow"),
-        ((5.0, 400.0), 0.6, "too slow"),
+        ((20.0, 40.0), 0.4, "too slow"),
+        ((5.0, 400.0), 0.5, "too slow"),
     ],
 )
 def test_a_speed_that_is_not_done_is_told_by_the_motions_duration(
