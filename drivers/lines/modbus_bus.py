@@ -32,7 +32,6 @@ from drivers.lines.serial_line import (
 )
 from instrument.clock import Clock
 from instrument.closeable import Closeable
-from instrument.devices import REPLY_S
 from instrument.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -43,7 +42,7 @@ AnswerLost = (NoReply, Garbled, PortGone)  # the device may or may not have exec
 
 TRIES = 3
 GIVE_UP_S = 1.5  # no exchange begins later than this after the first: an error within 2 s
-GIVE_UP_ANSWERS = GIVE_UP_S / REPLY_S  # on a slow line: as many answers' time
+GIVE_UP_ANSWERS = 6  # on a slow line: the time allowed for so many answers
 MAX_LATE_ANSWERS = 2  # earlier answers that may arrive one by one while resynchronising
 SILENCE_S = 0.00175  # between frames, above 19200 baud (Modbus over serial line, 2.5.1.1)
 # ValueError, TypeError, AttributeError: another thread has closed the port meanwhile.
