@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 from acquisition.commands.determinable import Determinable
 from acquisition.engine.frame_files import frame_bytes
 from acquisition.plan.plan import Plan
+from acquisition.plan.pose import Pose
 from acquisition.terminal.console import duration_text, out, print_lines, print_notes, print_text
 from acquisition.terminal.layout import table_lines, text_table_lines
 from instrument.config.load import Loaded
@@ -15,6 +17,8 @@ from instrument.config.load import Loaded
 if TYPE_CHECKING:
     from acquisition.results.finish import Outcome
     from analysis.report.data import Parameter
+
+_MOST_SETTINGS = 12  # of the lamp, that have a row each
 
 
 def print_plan(loaded: Loaded, plan: Plan) -> None:
@@ -26,14 +30,30 @@ def print_plan(loaded: Loaded, plan: Plan) -> None:
 
 
 def _lamp_rows(plan: Plan) -> Iterator[tuple[str, ...]]:
+    """Rows of the lamp settings; of many, those in a row with the same view angles are one."""
     views_deg: dict[int, list[float]] = {}
     for step in plan.points:
         views_deg.setdefault(step.lamp_setting, []).append(step.pose.theta_r)
-    positions = {step.lamp_setting: step.pose for step in plan.steps}
-    for number, pose in sorted(positions.items()):
-        own = views_deg.get(number, [])
-        span = f"{min(own):g} … {max(own):g}" if len(own) > 1 else "".join(f"{v:g}" for v in own)
-        yield f"lamp {number + 1}", f"{pose.theta_i:g}", f"{pose.dphi:g}", str(len(own)), span
+    poses = sorted({step.lamp_setting: step.pose for step in plan.steps}.items())
+    turning = len({pose.dphi for _, pose in poses}) > len({pose.theta_i for _, pose in poses})
+
+    def key(setting: tuple[int, Pose]) -> object:
+        number, pose = setting
+        fixed = pose.theta_i if turning else pose.dphi
+        return (fixed, views_deg.get(number)) if len(poses) > _MOST_SETTINGS else number
+
+    for _, members in groupby(poses, key):
+        group = list(members)
+        own = views_deg.get(group[0][0], [])
+        lamps, theta_i = [n + 1 for n, _ in group], [pose.theta_i for _, pose in group]
+        spans = (_span(theta_i), _span([pose.dphi for _, pose in group]))
+        yield f"lamp {_span(lamps)}", *spans, str(len(own) * len(group)), _span(own)
+
+
+def _span(values: Sequence[float]) -> str:
+    """Smallest and largest of the values, the one that all are, or nothing."""
+    ends = dict.fromkeys((min(values), max(values))) if values else ()
+    return " … ".join(f"{end:g}" for end in ends)
 
 
 def _plan_rows(loaded: Loaded, plan: Plan) -> Iterator[tuple[str, str]]:

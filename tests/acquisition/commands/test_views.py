@@ -19,8 +19,10 @@ from analysis.choice.choice import choose
 from analysis.data.csv_table import read_csv
 from analysis.models import MODELS
 from instrument.config.load import Loaded
+from instrument.config.protocol import Steps
 from instrument.errors import NotDetermined
 from instrument.geometry import Geometry
+from tests.support.scans import changed
 
 WIDTHS = range(40, 201)
 NUMBER = re.compile(r"[-+(]?[0-9]")
@@ -79,3 +81,17 @@ def test_a_plan_is_printed_whole_at_any_width(
 ) -> None:
     plan = make_plan(demo)
     _assert_whole_at_any_width(lambda: print_plan(demo, plan), monkeypatch)
+
+
+@pytest.mark.parametrize(("lamps", "rows"), [(12, 12), (31, 1)])
+def test_many_lamp_settings_with_the_same_views_are_one_row(
+    lamps: int, rows: int, demo: Loaded, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps = Steps(start=20.0, stop=75.0, num=lamps)
+    sweep = {"theta_r_deg": [80.0], "dphi_deg": [0.0], "theta_i_deg": steps}
+    moving = changed(demo, sweeps=[sweep])
+    lines = _printed(lambda: print_plan(moving, make_plan(moving)), 80, monkeypatch)
+    found = [line.split() for line in lines if line.startswith("lamp ")]
+    assert len(found) == rows
+    assert " ".join(found[-1]) == ("lamp 1 … 31 20 … 75 0 31 80" if rows == 1 else
+                                   "lamp 12 75 0 1 80")  # fmt: skip
