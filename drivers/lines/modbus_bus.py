@@ -110,6 +110,8 @@ class ModbusBus(Closeable):
             self._client.connect()
             self._gone = "" if self._follows_device else self._gone
         except (OSError, ValueError, termios.error) as error:
+            if self.losses and not self._tcp:
+                raise self._port_gone(who, str(error)) from error
             look = _CHECK_GATEWAY if self._tcp else _CHECK_PORT
             raise PortGone(f"{who}: cannot open {self.port}: {error}: {look}") from error
 

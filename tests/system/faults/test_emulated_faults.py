@@ -40,7 +40,7 @@ pytestmark = pytest.mark.waits
 DEADLINE_S = 5.0
 WITHIN_DEG = 0.01  # the stages' tolerance in `emulated_stages`
 PUSH_DEG = 0.4
-STATUS_LATE = "no status for 0.5 s while it moved"
+STATUS_LATE = "while it moved, so it was told to stop"  # no status, or the computer paused
 
 # A trigger in each state; for moves the second one.
 STATES: dict[str, tuple[When, str, int]] = {
