@@ -104,8 +104,10 @@ class ModbusBus(Closeable):
 
         A numbered name may belong to another device by then: it is opened again for a stop only.
         """
-        if self._closed or (self._gone and not (self._follows_device or at_any_path)):
-            raise self._port_gone(who, "it was closed" if self._closed else self._gone)
+        if self._closed:
+            raise PortGone(f"{who}: {self.port}: it was closed by this program")
+        if self._gone and not (self._follows_device or at_any_path):
+            raise self._port_gone(who, self._gone)
         try:
             self._client.connect()
             self._gone = "" if self._follows_device else self._gone

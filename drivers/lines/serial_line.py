@@ -293,7 +293,9 @@ class Line(Closeable):
     def _on_port(self, action: Callable[[serial.Serial], T]) -> T:
         port = self._serial
         if port is None:
-            raise self._gone("it was closed" if self._closed else "it was lost")
+            if self._closed:
+                raise PortGone(f"{self.who}: {self.port}: it was closed by this program")
+            raise self._gone("it was lost")
         try:
             return action(port)
         except _PORT_LOST as error:
