@@ -24,7 +24,7 @@ from instrument.errors import NotDetermined
 from instrument.geometry import Geometry
 from tests.support.scans import changed
 
-WIDTHS = range(40, 201)
+WIDTHS = range(40, 201, 3)
 NUMBER = re.compile(r"[-+(]?[0-9]")
 
 
