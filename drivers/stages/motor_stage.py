@@ -187,12 +187,7 @@ class MotorStage(ABC):
 
         Before homing, past a limit and while there is a fault it is refused and nothing is sent.
         """
-        low, high = self.limits_deg()
-        if not low - _ROUNDING_DEG <= angle_deg <= high + _ROUNDING_DEG:
-            raise DeviceError(
-                f"{self.name}: {angle_deg:g} deg asked for; its limits are {low:g} to {high:g} deg "
-                "(the device's own degrees): nothing has moved"
-            )
+        self._refuse_beyond_limits(angle_deg)
         now = self._status_before_motion()
         self._refuse_fault(now)
         if not now.homed:
@@ -342,6 +337,14 @@ class MotorStage(ABC):
             self._send_stop()
             self._raise_if_unwatched()
             raise Stopped(f"{self.name}: stopped as it was about to move")
+
+    def _refuse_beyond_limits(self, angle_deg: float) -> None:
+        low, high = self.limits_deg()
+        if not low - _ROUNDING_DEG <= angle_deg <= high + _ROUNDING_DEG:
+            raise DeviceError(
+                f"{self.name}: {angle_deg:g} deg asked for; its limits are {low:g} to {high:g} deg "
+                "(the device's own degrees): nothing has moved"
+            )
 
     def _refuse_lost_reference(self, now: Status) -> None:
         """Raise if the reference was lost: a controller that was without power has no position."""
