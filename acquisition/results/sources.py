@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from acquisition.results.reduction import reduced_run, require_usable
 from acquisition.results.run_folder import load_run_inputs
 from analysis.choice.notes import Note, NoteCode
 from analysis.data.acceptance import Acceptance
-from analysis.data.csv_table import read_table
+from analysis.data.csv_table import CsvTable, read_table
 from analysis.data.curet import read_curet
 from analysis.data.measurements import Measurements, SharedError
 from analysis.data.repeats import Repeats, mean_of_repeats
@@ -21,6 +22,7 @@ from instrument.errors import AllFlagged, InputError, NoMeasurement, NotDetermin
 from instrument.record.record import FILE_NAME, Record
 from instrument.text.quoting import printable
 
+_U_NAME = re.compile(r"(u|unc|uncertainty|err|error|std|sd|sigma|stdev|σ)(\b|_)", re.IGNORECASE)
 FORMATS = ("auto", "run", "csv", "curet")
 
 
@@ -132,7 +134,7 @@ def _csv(path: Path, wanted: Wanted) -> Source:
     m = table.measurements
     if not m.size:
         raise AllFlagged(f"all {table.flagged} points are flagged: there is nothing to fit")
-    notes = _flagged(table.flagged, table.flagged + m.size)
+    notes = _flagged(table.flagged, table.flagged + m.size) + _ignored_u(table)
     if wanted.repeats is not None:
         m, repeats = mean_of_repeats(m)
         notes += _averaged(repeats, m)
@@ -143,6 +145,18 @@ def _csv(path: Path, wanted: Wanted) -> Source:
 def _flagged(flagged: int, points: int) -> tuple[Note, ...]:
     text = f"{flagged} of {points} points are flagged and not fitted"
     return (Note(NoteCode.FLAGGED, text),) if flagged else ()
+
+
+def _ignored_u(table: CsvTable) -> tuple[Note, ...]:
+    """Columns that seem to hold uncertainties, in a table that states none."""
+    names = [printable(name[:40]) for name in table.ignored if _U_NAME.match(name)]
+    if not names or table.measurements.u_random is not None:
+        return ()
+    text = (
+        f"not read: {', '.join(names[:8])}; an uncertainty is read from u_brdf, in 1/sr, or "
+        "u_independent_relative, relative to the value"
+    )
+    return (Note(NoteCode.IGNORED_U, text),)
 
 
 def _averaged(repeats: Repeats, m: Measurements) -> tuple[Note, ...]:

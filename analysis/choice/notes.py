@@ -34,6 +34,7 @@ class NoteCode(StrEnum):
     # Source of the measurements.
     FLAGGED = "flagged"
     REPEATS = "repeats"
+    IGNORED_U = "ignored_u"
     U_SHARED = "u_shared"
     ASSUMED_NO_SHARED_ERROR = "assumed_no_shared_error"
     ASSUMED_EXACT_ANGLES = "assumed_exact_angles"

@@ -26,11 +26,15 @@ _SEPARATORS = {";": "';'", "\t": "tabs", " ": "spaces"}
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """Line number of the header, number of its columns, and index of each column by name."""
+    """Line number of the header, number of its columns, and index of each column by name.
+
+    ignored: names of the columns that are not read.
+    """
 
     line: int
     width: int
     indices: dict[str, int]
+    ignored: tuple[str, ...] = ()
 
 
 def read_header(file: TextFile, rows: Iterator[tuple[int, str]]) -> Header:
@@ -57,7 +61,7 @@ def read_header(file: TextFile, rows: Iterator[tuple[int, str]]) -> Header:
         raise _refused(file, line, text.index(separator) + 1, what)
     _check_names(file, line, names, [start for start, _ in fields])
     indices = {name: names.index(name) for name in names if is_read(name)}
-    return Header(line, len(names), indices)
+    return Header(line, len(names), indices, tuple(n for n in names if n and n not in indices))
 
 
 def _refused(file: TextFile, line: int, column: int, text: str) -> InputError:

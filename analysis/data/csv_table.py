@@ -37,13 +37,15 @@ class CsvTable:
     """Content of a table: the rows to fit, and the rig's acceptance where it is stated.
 
     flagged: number of rows left out because of their flags. states_shared: the table has columns
-    about errors that rows share, or states the independent part of u.
+    about errors that rows share, or states the independent part of u. ignored: names of the columns
+    that are not read.
     """
 
     measurements: Measurements
     acceptance: Acceptance | None
     flagged: int
     states_shared: bool
+    ignored: tuple[str, ...]
 
 
 def read_csv(path: Path) -> Measurements:
@@ -204,7 +206,8 @@ class _Table:
             relative=self._no_brdf,
             free_levels=self._no_brdf,
         )
-        return CsvTable(found, acceptance, self.flagged, bool(shared) or own is not None)
+        states_shared, ignored = bool(shared) or own is not None, self.header.ignored
+        return CsvTable(found, acceptance, self.flagged, states_shared, ignored)
 
     def _relative(self, optional: OptionalColumns, theta_i_deg: FloatArray) -> FloatArray:
         """Radiance over cos(theta_i), (N,), proportional to the BRDF at one lamp setting."""

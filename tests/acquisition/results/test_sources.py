@@ -13,6 +13,7 @@ from acquisition.results.reduction import reduced_run
 from acquisition.results.run_folder import load_run_inputs, run_meta, write_run_inputs
 from acquisition.results.sources import Wanted, read_source
 from acquisition.rig import open_devices
+from analysis.choice.notes import NoteCode
 from instrument.config.load import Loaded, load_protocol
 from instrument.errors import AllFlagged
 from instrument.record.record import Record
@@ -62,3 +63,30 @@ def test_a_table_of_flagged_points_alone_has_nothing_to_fit(tmp_path: Path) -> N
     path.write_text("theta_i_deg,theta_r_deg,dphi_deg,brdf,flags\n30,0,0,,no signal\n")
     with pytest.raises(AllFlagged, match="all 1 points are flagged"):
         read_source(path, Wanted())
+
+
+@pytest.mark.parametrize("name", ["u_brdf_percent", "u_rel", "std", "Uncertainty", "σ_brdf"])
+def test_a_column_of_u_that_is_not_read_is_named(name: str, tmp_path: Path) -> None:
+    """A u in another unit must not be lost in silence."""
+    path, rows = tmp_path / "table.csv", "30,0,0,0.2,1\n30,9,0,0.2,1\n"
+    path.write_text(f"theta_i_deg,theta_r_deg,dphi_deg,brdf,{name}\n{rows}")
+    (note,) = (n for n in read_source(path, Wanted()).notes if n.code == NoteCode.IGNORED_U)
+    assert note.text.startswith(f"not read: {name}; an uncertainty is read from u_brdf, in 1/sr")
+
+
+@pytest.mark.parametrize("name", ["u_brdf", "sample", "temperature", "unit"])
+def test_other_columns_are_ignored(name: str, tmp_path: Path) -> None:
+    path, rows = tmp_path / "table.csv", "30,0,0,0.2,1\n30,9,0,0.2,1\n"
+    path.write_text(f"theta_i_deg,theta_r_deg,dphi_deg,brdf,{name}\n{rows}")
+    codes = {note.code for note in read_source(path, Wanted()).notes}
+    assert NoteCode.IGNORED_U not in codes
+
+
+def test_repeats_are_averaged_on_request(tmp_path: Path) -> None:
+    path, rows = tmp_path / "table.csv", "30,0,0,0.2,.01\n30,9,0,0.2,.01\n30,9,0,0.3,.01\n"
+    path.write_text(f"theta_i_deg,theta_r_deg,dphi_deg,brdf,u_brdf\n{rows}")
+    source = read_source(path, Wanted(repeats="mean"))
+    assert source.measurements.brdf.tolist() == pytest.approx([0.2, 0.25])
+    (note,) = (n for n in source.notes if n.code == NoteCode.REPEATS)
+    assert note.text.startswith("1 of 2 geometries are means of 2 repeats, which scatter by 7.1 ti")
+    assert note.text.endswith("the u is too small for what changes between repeats")
