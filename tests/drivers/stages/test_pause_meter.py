@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
 import threading
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -15,6 +20,7 @@ from instrument.clock import SystemClock
 from instrument.errors import ComputerPaused, DeviceError
 from sim.emulated.motor import Motor
 from sim.emulated.wire import Controller, Fault, PtyWire
+from tests.support.paths import ROOT
 from tests.support.stages.emulated_stages import LIMITS, SLOW
 from tests.support.stages.kinds import controller_for, open_stage
 from tests.support.stages.waiting import wait_until
@@ -188,3 +194,37 @@ def test_a_pause_is_known_before_the_meters_own_thread_wakes() -> None:
     assert meter.paused_since_s(begun_s) == pytest.approx(PAUSED_S, abs=PAUSE_S)
     assert meter.paused_since_s(clock.now_s() + 1.0) == 0.0
     over.set()
+
+
+STOPPED_CHILD = """
+import sys, threading
+from drivers.stages.pause_meter import PauseMeter
+from instrument.clock import SystemClock
+clock = SystemClock()
+meter, begun_s = PauseMeter(clock), clock.now_s()
+meter.begin(threading.Event())
+print("ready", flush=True)
+sys.stdin.readline()
+print(meter.paused_since_s(begun_s), flush=True)
+"""
+
+
+def test_a_stopped_process_is_a_pause_of_that_length() -> None:
+    command = [sys.executable, "-c", STOPPED_CHILD]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
+    ) as child:
+        assert child.stdin is not None
+        assert child.stdout is not None
+        assert child.stdout.readline() == "ready\n"
+        begun_s = time.monotonic()
+        child.send_signal(signal.SIGSTOP)
+        os.waitpid(child.pid, os.WUNTRACED)  # it stands
+        stopped_s = time.monotonic()
+        wait_until(lambda: time.monotonic() - stopped_s > 3 * PAUSE_S)
+        least_s = time.monotonic() - stopped_s
+        child.send_signal(signal.SIGCONT)
+        child.stdin.write("\n")
+        child.stdin.flush()
+        measured_s = float(child.stdout.readline())
+        assert least_s - PAUSE_S < measured_s < time.monotonic() - begun_s
