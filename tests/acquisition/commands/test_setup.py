@@ -6,16 +6,24 @@ import os
 import pty
 import re
 import select
+import signal
 import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
 
+from acquisition.commands import setup
+from acquisition.engine.axis import Axis
+from acquisition.rig import OpenRig
+from instrument.clock import SystemClock
 from instrument.config.load import load_rig
 from instrument.errors import InputError
 from tests.support.command import gonio_here as gonio
 from tests.support.paths import CONFIGS, ROOT
+from tests.support.stages.emulated_stages import EMULATED_STAGES, SLOW
+from tests.support.stages.waiting import wait_until
 
 BENCH, PAPER = CONFIGS / "rigs" / "bench_12bit.yaml", CONFIGS / "rigs" / "paper_1995.yaml"
 
@@ -64,6 +72,33 @@ camera: {driver: v4l2, device: /dev/nocamera, pixel_format: GREY, bit_depth: 8, 
          max_exposure_s: 0.5, frame_overhead_s: 0.03}
 lamp: {driver: manual, darkened_by: hand, white_electrons_per_s: 100000.0}
 """
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize(
+    ("number", "why"), [(signal.SIGHUP, "the terminal was closed"), (signal.SIGQUIT, "operator")]
+)
+def test_a_move_ends_with_a_closed_terminal(
+    number: signal.Signals, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The stage is a real driver over an emulated controller, and takes three seconds."""
+    with EMULATED_STAGES["newport"](SLOW) as emulated:
+
+        class Emulated(OpenRig):
+            def axis(self, name: str) -> Axis:
+                return Axis(name, emulated.stage, self._rig.axes[name], SystemClock())
+
+        def strike(thread: int) -> None:
+            wait_until(lambda: emulated.motor.moving and emulated.motor.position_deg > 3)
+            signal.pthread_kill(thread, number)
+
+        monkeypatch.setattr(setup, "OpenRig", Emulated)
+        threading.Thread(target=strike, args=(threading.get_ident(),)).start()
+        done = gonio("move", "theta_r", "60", "--rig", BENCH)
+        assert done.returncode == 4, done.stderr
+        assert why in done.stderr
+        wait_until(lambda: not emulated.motor.moving)
+        assert emulated.motor.position_deg < 55
 
 
 @pytest.fixture
