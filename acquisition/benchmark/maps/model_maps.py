@@ -28,7 +28,7 @@ from acquisition.benchmark.maps.smooth_dielectric import (
 from acquisition.benchmark.result import MapPicture
 from analysis.models.rough.form_error import form_error
 from analysis.models.rough.form_error_table import LIMIT_DEG
-from analysis.models.specular.beckmann_spizzichino import poisson_sum
+from analysis.models.specular.poisson_sums import poisson_sum
 from analysis.report.style import svg_of
 from instrument.geometry import FloatArray, Geometry
 

@@ -16,11 +16,11 @@ Perspectives", IEEE Transactions on Pattern Analysis and Machine Intelligence 13
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity
+from analysis.models.specular.poisson_sums import poisson_sum, poisson_sums
 from analysis.models.specular.surface_statistics import (
     check_lengths,
     curvature_radius,
@@ -33,15 +33,20 @@ from instrument.geometry import FloatArray, Geometry
 SCALE = Parameter("scale", "1", 0.0, 10.0, 0.1, scale=True)
 # Both lengths matter by their ratio to the wavelength: a fit tries decades.
 SIGMA_H = Parameter(
-    "sigma_h", "wavelengths", 0.0, 100.0, 0.5, starts=(0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 80.0)
+    "sigma_h",
+    "wavelengths",
+    0.0,
+    100.0,
+    0.5,
+    starts=(0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 80.0),
+    logarithmic=True,
 )
 CORRELATION_LENGTH = Parameter(
     "correlation_length", "wavelengths", 0.1, 1000.0, 10.0,
-    starts=(0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 400.0),
+    starts=(0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 400.0), logarithmic=True,
 )  # fmt: skip
 
 K = 2 * math.pi  # the propagation constant (64), in 1/wavelength
-Weight = Callable[..., FloatArray]  # of m, g and q
 
 
 def lobe_brdf(
@@ -67,11 +72,10 @@ def lobe_gradient(
     """Derivatives of `lobe_brdf` by its parameters, sums over m again. As in `Model.gradient`."""
     g, q = optical_roughness(geometry, sigma_h), lobe_exponent(geometry, correlation_length)
     factor = lobe_factor(geometry, correlation_length)
-    by_ln_g = poisson_sum(g, q, lambda m, g, _: (m - g) / m)
-    by_ln_t2 = poisson_sum(g, q, lambda m, _, q: (1 - q / m) / m)
+    lobe, by_ln_g, by_ln_t2 = poisson_sums(g, q, (_per_m, _by_ln_g, _by_ln_t2))
     per_sigma = scale * 2 / sigma_h if sigma_h > 1e-150 else 0.0  # f rises as sigma_h^2
     return {
-        "scale": factor * poisson_sum(g, q, _per_m),
+        "scale": factor * lobe,
         "sigma_h": per_sigma * factor * by_ln_g,
         "correlation_length": scale * 2 / correlation_length * factor * by_ln_t2,
     }
@@ -193,101 +197,16 @@ def _coherent(
         return np.exp(-optical_roughness(geometry, sigma_h)) * np.square(rho_0)
 
 
-# The sum over m.
-
-BLOCK = 4096  # elements at a time: what a core's own cache holds
-TERMWISE_BELOW = 40.0  # largest term from which on the sum is computed as an integral
-STEP = 0.75  # of a standard deviation of the summand: the trapezoid's error is e^{-2π²/0.75²}
-LEFT, RIGHT = 10, 13  # steps to either side: beyond them less than 1e-13 of a Poisson's sum
-TINY = 1e-300
-
-
 def _per_m(m: FloatArray, *_: FloatArray) -> FloatArray:
     return 1 / m
 
 
-def poisson_sum(g: FloatArray, q: FloatArray, weight: Weight) -> FloatArray:
-    """e^{-g} Σ_{m≥1} g^m/m! w(m) e^{-q/m}, element by element; w is smooth, as 1/m is in (18).
-
-    `g` and `q`, dimensionless, broadcast to the result's shape. A largest term below m = 40: summed
-    term by term (up to 110 of them, each from the one before it, without overflow). Beyond, the
-    summand is a smooth bell of width s ≥ 1: by Poisson's summation formula its sum over integers
-    and its sum in steps of h, times h, both are its integral but for e^{-2π²(s/h)²}. 24 nodes,
-    0.75 s apart, then are enough at any g; where s is so narrow that h would be below 1, h = 1 is
-    the sum itself. Largest relative error against sums of 25 digits: 2e-11 (g 18, q 1400: a skewed
-    bell).
-    """
-    g, q = np.broadcast_arrays(g, q)
-    flat_g, flat_q = g.ravel(), q.ravel()
-    total = np.empty(flat_g.shape)
-    with np.errstate(under="ignore"):
-        for start in range(0, total.size, BLOCK):
-            part = slice(start, start + BLOCK)
-            total[part] = _block(flat_g[part], flat_q[part], weight)
-    return total.reshape(g.shape)
+def _by_ln_g(m: FloatArray, g: FloatArray, _: FloatArray) -> FloatArray:
+    return (m - g) / m
 
 
-def _block(g: FloatArray, q: FloatArray, weight: Weight) -> FloatArray:
-    peak = largest_term(g, q)
-    few = peak < TERMWISE_BELOW
-    if few.all():
-        return _term_by_term(g, q, float(peak.max(initial=0.0)), weight)
-    if not few.any():
-        return _in_wide_steps(g, q, peak, weight)
-    total = np.empty(g.shape)
-    total[few] = _term_by_term(g[few], q[few], float(peak[few].max()), weight)
-    total[~few] = _in_wide_steps(g[~few], q[~few], peak[~few], weight)
-    return total
-
-
-def largest_term(g: FloatArray, q: FloatArray) -> FloatArray:
-    """The m, not rounded, near which g^m/m! e^{-q/m} is largest: m² ln(m/g) = q, any shape.
-
-    m = g e^{W/2} with W e^W = 2q/g² (Lambert's W): a start good to 2 % and two steps of
-    R. Iacono, J. P. Boyd, Advances in Computational Mathematics 43 (2017), good to 1e-9.
-    """
-    g = np.maximum(g, 1e-100)
-    y = np.maximum(2 * q / np.square(g), TINY)
-    log = np.log1p(y)
-    W = log * (1 - np.log1p(log) / (2 + log))
-    for _ in range(2):
-        W = W / (1 + W) * (1 + np.log(y / W))
-    return np.asarray(g * np.exp(W / 2))
-
-
-def _term_by_term(g: FloatArray, q: FloatArray, peak: float, weight: Weight) -> FloatArray:
-    """The sum up to 9 standard deviations and 12 terms beyond the largest `peak`."""
-    poisson = np.exp(-g)
-    total = np.zeros(g.shape)
-    for term in range(1, math.ceil(peak + 9 * math.sqrt(peak) + 12) + 1):
-        m = np.float64(term)
-        poisson = poisson * (g / m)
-        total += poisson * np.exp(-q / m) * weight(m, g, q)
-    return total
-
-
-def _in_wide_steps(g: FloatArray, q: FloatArray, peak: FloatArray, weight: Weight) -> FloatArray:
-    """The sum in steps of h around the largest term, times h."""
-    g = np.maximum(g, TINY)
-    h = np.maximum(1.0, STEP * np.sqrt(peak / (1 + 2 * q / np.square(peak))))
-    middle = np.rint(peak)
-    total = np.zeros(g.shape)
-    for step in range(-LEFT, RIGHT + 1):
-        m = np.maximum(middle + step * h, 0.5)  # terms so far down are negligible
-        total += poisson_term(m, g) * np.exp(-q / m) * weight(m, g, q)
-    return h * total
-
-
-def poisson_term(m: FloatArray, g: FloatArray) -> FloatArray:
-    """e^{-g} g^m/m! for real m above 10, to 1e-13 and the rounding of m - g; `m`, `g` broadcast.
-
-    Dimensionless. By Stirling's series for m!, and g - m + m ln(m/g) = g ((1+d) ln(1+d) - d) with
-    m = g (1+d): the exponents, which are as large as m ln g, never stand alone.
-    """
-    d = (m - g) / g
-    r = 1 / m
-    stirling = r * (1 / 12 - r * r * (1 / 360 - r * r / 1260))
-    return np.exp(-g * ((1 + d) * np.log1p(d) - d) - stirling) / np.sqrt(2 * math.pi * m)
+def _by_ln_t2(m: FloatArray, _: FloatArray, q: FloatArray) -> FloatArray:
+    return (1 - q / m) / m
 
 
 BECKMANN_SPIZZICHINO = Model(

@@ -13,10 +13,10 @@ from analysis.models.specular.beckmann_spizzichino import (
     lobe_exponent,
     lobe_factor,
     optical_roughness,
-    poisson_sum,
     rough_lobe_brdf,
     smooth_lobe_brdf,
 )
+from analysis.models.specular.poisson_sums import poisson_sum
 from tests.support.models.method_scenes import angles
 
 

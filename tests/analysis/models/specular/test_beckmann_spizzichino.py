@@ -14,16 +14,14 @@ from hypothesis import strategies as st
 from analysis.models import MODELS
 from analysis.models.specular.beckmann_spizzichino import (
     geometric_factor,
-    largest_term,
     lobe_brdf,
     optical_roughness,
-    poisson_sum,
-    poisson_term,
     rough_lobe_brdf,
     smooth_lobe_brdf,
     spike_brdf,
     wave_vector,
 )
+from analysis.models.specular.poisson_sums import largest_term, poisson_sum, poisson_term
 from analysis.models.specular.surface_statistics import slope_scale
 from analysis.models.specular.torrance_sparrow import (
     half_vector,
