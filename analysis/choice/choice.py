@@ -80,19 +80,17 @@ def choose(
     require_light(measurements)
     first, *others = _rungs(measurements, models, method)
     tried = Candidates.of(first, measurements, robust, every=models is not None)
-    fitted = _Fitted.of(tried.refined(acceptance, thoroughly=not others), tried.measurements)
+    fitted = _Fitted.of(tried.refined(acceptance), tried.measurements)
     for rung in others:
         explained = bool(fitted.within_u)
         if explained and len(MODELS[rung[0]].parameters) > _MOST_PARAMETERS_AHEAD:
             break
         tried = tried.with_more(rung)
         known = {c.model for c in fitted.results}
-        new = _Fitted.of(tried.refined(acceptance, known, thoroughly=False), tried.measurements)
+        new = _Fitted.of(tried.refined(acceptance, known), tried.measurements)
         fitted = _Fitted((*fitted.results, *new.results), {**fitted.agreements, **new.agreements})
         if explained:
             break
-    if not fitted.within_u and others:  # all compared about the same model near the data
-        fitted = _Fitted.of(tried.refined(acceptance), tried.measurements)
     return _chosen(tried, fitted, acceptance)
 
 

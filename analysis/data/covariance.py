@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.data.measurements import Measurements
+from analysis.data.sweeps import signed_view, sweeps
 from instrument.geometry import BoolArray, Brdf, FloatArray, Geometry, IntArray
 
 if TYPE_CHECKING:
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 LAMP_LEVEL = "lamp level"
 
 _MAX_DENSE = 100_000  # entries of a dense array; larger ones are mostly zeros, so sparse
+# A model may be steeper than the data between neighbours by this factor: at the flank of a lobe of
+# which one point alone is inside. Views closer than the least step count as one view.
+_STEEPER, _LEAST_STEP_DEG = 4.0, 0.1
 _U_UNKNOWN_LEVEL = 0.3  # relative u of a lamp level, once normalised to a model near the data
 
 
@@ -35,6 +39,7 @@ class Covariance:
     common: (N, K), shifts by one u of each shared error, in the data's unit; sparse for a long
         scan, whose dense array would fill the memory.
     names: name of each shared error, for messages; empty where they have none.
+    log_determinant: ln det C, of C in the square of the data's unit.
     """
 
     variance: FloatArray
@@ -43,6 +48,7 @@ class Covariance:
     _whitened: Columns = field(init=False, repr=False)
     _vectors: FloatArray = field(init=False, repr=False)
     _shrink: FloatArray = field(init=False, repr=False)
+    log_determinant: float = field(init=False)
 
     def __post_init__(self) -> None:
         if np.any(self.variance <= 0) or not np.all(np.isfinite(self.variance)):
@@ -58,6 +64,8 @@ class Covariance:
         object.__setattr__(self, "_whitened", V)
         object.__setattr__(self, "_vectors", W)
         object.__setattr__(self, "_shrink", 1 / (root * (1 + root)))
+        log_det = np.sum(np.log(self.variance)) + 2 * np.sum(np.log(root))
+        object.__setattr__(self, "log_determinant", float(log_det))
 
     def whiten(self, x: FloatArray) -> FloatArray:
         """C^(-1/2) x for x of shape (N,) or (N, M), in the data's unit.
@@ -126,37 +134,46 @@ def independent_covariance(measurements: Measurements) -> Covariance:
     return Covariance(variance, np.zeros((measurements.size, 0)))
 
 
-def full_covariance(
-    measurements: Measurements, smooth: Brdf, own: Brdf | None = None
-) -> Covariance:
-    """Covariance of all stated uncertainties, linearised about models near the data.
+def has_shared_errors(m: Measurements) -> bool:
+    """True if more than `u_random` is stated: `full_covariance` then differs from that alone."""
+    angles = m.u_theta_i_deg, m.u_theta_r_deg, m.u_dphi_deg
+    return bool(m.shared) or m.free_levels or any(angles)
 
-    `smooth` and `own` return BRDF in 1/sr, of the geometry's shape. `smooth`, the best model so
-    far, converts the error of theta_r, which a stage repeats at every return to an angle, into one
-    of the BRDF: the same for every model that is compared. `own` (default `smooth`) is the model
-    being fitted; it converts the other shared errors. With another model's shifts, a large error
-    of the tile could pass for the difference between the two models.
 
-    Relative errors are multiplied with a model and not with the data: scaled by noisy data, a
+def full_covariance(measurements: Measurements, brdf: Brdf) -> Covariance:
+    """Covariance of all stated uncertainties, linearised about a model near the data.
+
+    `brdf` returns the model's BRDF in 1/sr, of the geometry's shape. It converts the errors of the
+    angles into errors of the BRDF, and the relative ones: multiplied with noisy data instead, a
     common relative error pulls the fit towards the low points (Peelle's pertinent puzzle).
+
+    Each model is given its own curve, so that its fit does not depend on the others. Two guards
+    keep a model from hiding a misfit behind the steepness of its own lobe. The error of theta_r,
+    which differs from point to point, counts with no more than a few times the slope of the data
+    themselves (`_view_limit`). And comparisons of models add `log_determinant`: chi2 + ln det C is
+    -2 ln of the likelihood, in which a covariance that is too large costs more than it saves.
     Raises `ValueError` where `u_random` is not stated.
     """
-    m, own = measurements, own or smooth
+    m = measurements
     if m.u_random is None:
         raise ValueError("u_random is not stated; allowed: a u_random in 1/sr for every point")
-    f = own(m.geometry)
-    angles: tuple[tuple[str, dict[str, float], Brdf, IntArray | FloatArray], ...] = (
-        ("theta_r", {"theta_r": m.u_theta_r_deg}, smooth, m.theta_r_deg),
-        ("theta_i, lamp setting", {"theta_i": m.u_theta_i_deg}, own, m.lamp_setting),
-        ("dphi, lamp setting", {"dphi": m.u_dphi_deg}, own, m.lamp_setting),
+    f = brdf(m.geometry)
+    unlimited, limit = np.full(m.size, np.inf), _view_limit(m)
+    angles: tuple[tuple[str, dict[str, float], FloatArray, IntArray | FloatArray], ...] = (
+        ("theta_r", {"theta_r": m.u_theta_r_deg}, limit, m.theta_r_deg),
+        ("theta_i, lamp setting", {"theta_i": m.u_theta_i_deg}, unlimited, m.lamp_setting),
+        ("dphi, lamp setting", {"dphi": m.u_dphi_deg}, unlimited, m.lamp_setting),
     )
-    groups = [(name, angle_sensitivity(m, brdf, **u), group) for name, u, brdf, group in angles]
+    groups = [
+        (name, np.clip(angle_sensitivity(m, brdf, **u), -most, most), group)
+        for name, u, most, group in angles
+    ]
     for error in m.shared:
-        turned = angle_sensitivity(m, own, theta_i=error.theta_i_deg, theta_r=error.theta_r_deg)
+        turned = angle_sensitivity(m, brdf, theta_i=error.theta_i_deg, theta_r=error.theta_r_deg)
         groups.append((error.name, f * error.u_relative + turned, error.group))
     if m.free_levels:
         groups.append((LAMP_LEVEL, _U_UNKNOWN_LEVEL * f, m.lamp_setting))
-    second_order = [_second_order_u(m, smooth, **u) for _, u, _, _ in angles]
+    second_order = [np.clip(_second_order_u(m, brdf, **u), -most, most) for _, u, most, _ in angles]
     variance = np.square(m.u_random) + np.sum(np.square(second_order), axis=0)
     rows: list[IntArray] = []
     columns: list[IntArray] = []
@@ -213,6 +230,25 @@ def _numbered(names: list[str]) -> Iterator[str]:
     for name in names:
         so_far[name] += 1
         yield name if total[name] == 1 else f"{name} {so_far[name]}"
+
+
+def _view_limit(m: Measurements) -> FloatArray:
+    """Largest credible shift (N,) in 1/sr of each point by one u of theta_r.
+
+    A few times the steepest change of the data to a neighbour in the same sweep: a lobe that is
+    resolved is no steeper between the points. Infinite for a point without neighbours, and at
+    least the noise, which hides smaller shifts.
+    """
+    limit = np.full(m.size, np.inf)
+    if not m.u_theta_r_deg or m.u_random is None:
+        return limit
+    views = signed_view(m)
+    for sweep in sweeps(m):
+        step = np.maximum(np.abs(np.diff(views[sweep.points])), _LEAST_STEP_DEG)
+        slope = np.abs(np.diff(m.brdf[sweep.points])) / step
+        steepest = np.maximum(np.r_[0.0, slope], np.r_[slope, 0.0])
+        limit[sweep.points] = _STEEPER * m.u_theta_r_deg * steepest
+    return np.asarray(np.maximum(limit, m.u_random))
 
 
 def angle_sensitivity(m: Measurements, smooth: Brdf, **u_angle: FloatArray | float) -> FloatArray:

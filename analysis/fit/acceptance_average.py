@@ -6,12 +6,16 @@ round. The search runs with them fixed, then they are computed anew, until they 
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analysis.data.acceptance import Acceptance, averaged_brdf, required_rings
 from analysis.data.measurements import Measurements
+from analysis.fit.criteria import reduced_chi2
+from analysis.fit.first_fit import deepest
 from analysis.fit.levenberg_marquardt import Minimum
 from analysis.fit.problem import Problem
 from instrument.geometry import FloatArray, Geometry, IntArray
@@ -42,22 +46,31 @@ def fit_averaged(
     measurements: Measurements,
     acceptance: Acceptance,
     u: FloatArray,
+    starts: Sequence[FloatArray] = (),
 ) -> AveragedFit:
     """Refit with the model averaged over the acceptance, where that changes it by more than u/3.
 
-    `solution` is the fit without averaging, `u` (N,) the independent uncertainty in 1/sr.
+    `solution` is the fit without averaging, `u` (N,) the independent uncertainty in 1/sr; it counts
+    as larger where the model does not explain the data. `starts`, (K,) each, are other minima of
+    the fit without averaging: the averaged model may fit best near one of them.
     """
-    rings = _rings(problem, solution.x, measurements, acceptance, u)
+
+    def misfit() -> FloatArray:
+        if measurements.u_random is None:
+            return u
+        return u * math.sqrt(max(1.0, reduced_chi2(problem, solution)))
+
+    rings = _rings(problem, solution.x, measurements, acceptance, misfit())
     mean = _mean(problem, solution.x, measurements, acceptance, rings)
-    if np.all(np.abs(mean - problem.model_brdf(solution.x)) <= RELEVANT * u):
+    if np.all(np.abs(mean - problem.model_brdf(solution.x)) <= RELEVANT * misfit()):
         return AveragedFit(problem, solution, averaged=False, converged=True)
     converged = False
     for _ in range(MAX_ROUNDS):
         problem = _corrected(problem, solution.x, mean)
-        solution = problem.solve(solution.x)
-        rings = np.maximum(rings, _rings(problem, solution.x, measurements, acceptance, u))
+        solution = deepest(problem, solution.x, starts)
+        rings = np.maximum(rings, _rings(problem, solution.x, measurements, acceptance, misfit()))
         mean = _mean(problem, solution.x, measurements, acceptance, rings)
-        converged = bool(np.all(np.abs(mean - problem.predict(solution.x)) < CONVERGED * u))
+        converged = bool(np.all(np.abs(mean - problem.predict(solution.x)) < CONVERGED * misfit()))
         if converged:
             break
     return AveragedFit(problem, solution, averaged=True, converged=converged)

@@ -39,22 +39,37 @@ def probability(chi2: float, dof: int) -> float:
     return min(float(np.sum(np.exp(logs))) + odd * math.erfc(math.sqrt(half)), 1.0)
 
 
-def explained(problem: Problem, found: Minimum, m: Measurements) -> bool:
-    """True if the fit converged to within the stated u, or to rounding where none is stated."""
+def enough_chi2(m: Measurements, problem: Problem) -> float:
+    """chi2 of a model that explains the data: its mean and 3 standard deviations more.
+
+    Where no u is stated, that of rounding.
+    """
     if m.u_random is None:
-        return found.converged and found.chi2 <= m.size * variance_floor(problem)
-    return found.converged and probability(found.chi2, m.size - found.x.size) > SIGNIFICANCE
+        return m.size * variance_floor(problem)
+    dof = max(m.size - len(problem.model.parameters), 1)
+    return dof + 3 * math.sqrt(2 * dof)
+
+
+def reduced_chi2(problem: Problem, found: Minimum) -> float:
+    """chi2 over the degrees of freedom, of which at least one is counted."""
+    return found.chi2 / max(problem.brdf.size - found.x.size, 1)
 
 
 def bic(m: Measurements, problem: Problem, found: Minimum) -> float:
-    """Schwarz's criterion: chi2 + K ln N, or N ln(rss / N) + K ln N where no u is stated."""
+    """Schwarz's criterion: -2 ln(likelihood) + K ln N, but for a constant of the measurements.
+
+    -2 ln(likelihood) is chi2 + ln(det C / det C0), C0 the covariance of `u_random` alone, or
+    N ln(rss / N) where no u is stated. C is linearised about the model's own curve, so that it
+    differs between models: chi2 alone would favour the model with the larger C.
+    """
     return _deviance(m, problem, found.chi2) + found.x.size * math.log(m.size)
 
 
 def _deviance(m: Measurements, problem: Problem, chi2: float) -> float:
-    """-2 ln(likelihood) but for a constant: chi2, or N ln(rss / N) where no u is stated."""
+    """-2 ln(likelihood) but for a constant of the measurements."""
     if m.u_random is not None:
-        return chi2
+        independent = 2 * float(np.sum(np.log(m.u_random)))
+        return chi2 + problem.covariance.log_determinant - independent
     rss = chi2 * float(np.mean(problem.covariance.variance))
     return m.size * math.log(max(rss / m.size, variance_floor(problem)))
 

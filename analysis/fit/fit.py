@@ -9,22 +9,50 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from analysis.data.acceptance import Acceptance
-from analysis.data.covariance import Covariance, full_covariance
+from analysis.data.covariance import Covariance, full_covariance, has_shared_errors
 from analysis.data.measurements import Measurements
 from analysis.fit.acceptance_average import AveragedFit, fit_averaged
-from analysis.fit.criteria import OUTLIER_U, SIGNIFICANCE, aicc, bic, noise_variance, probability
-from analysis.fit.first_fit import FirstFit, first_fit
+from analysis.fit.criteria import (
+    OUTLIER_U,
+    SIGNIFICANCE,
+    aicc,
+    bic,
+    enough_chi2,
+    noise_variance,
+    probability,
+    reduced_chi2,
+)
+from analysis.fit.first_fit import (
+    FirstFit,
+    FirstFits,
+    all_minima,
+    deepest,
+    huber_refit,
+)
+from analysis.fit.levenberg_marquardt import Minimum
 from analysis.fit.problem import Problem
 from analysis.fit.relative_scale import normalise_lamp_levels, unscaled_parameters
 from analysis.fit.scale_ratios import Ratio, scale_ratios
 from analysis.fit.uncertainty import uncertainty
 from analysis.models import Model
 from analysis.models.base import Validity
-from instrument.geometry import BoolArray, Brdf, FloatArray, Geometry
+from instrument.geometry import BoolArray, FloatArray, Geometry
+
+# Rounds in which misfit is turned into noise, until chi2 is within this factor of its expectation.
+_ROUNDS_OF_WIDENING, _WIDE_ENOUGH = 8, 1.1
+
+# Minima of the first fit from which the search with all uncertainties starts, and the relative
+# tolerance of its first steps.
+_CONTENDERS, _QUICK_RTOL = 4, 1e-2
+
+# Reduced chi2 beyond which a model is so far from the data that intervals would say nothing.
+_FAR_CHI2 = 25.0
 
 NOT_CONVERGED = "the averaging over lamp and lens did not converge"
 
@@ -33,11 +61,12 @@ NOT_CONVERGED = "the averaging over lamp and lens did not converge"
 class FitResult:
     """A model fitted to N points; mappings are by parameter name, in the parameters' units.
 
-    problem, x: the problem solved, and the parameters (K,) in the model's order. values: the same
-    by name. u: standard uncertainties, None where none is valid; `intervals` then has the 95 %
-    profile-likelihood interval. undetermined: parameters whose interval is more than half of their
-    domain. correlation: (K, K), NaN for a parameter without u. ratios: those of the model's scales
-    that the data determine, by name such as "ks/albedo".
+    problem: with the stated uncertainties. solved: the same, with the misfit as noise where the
+    model does not explain the data. x: the minimum of `solved`, (K,) in the model's order. values:
+    the same by name. u: standard uncertainties, None where none is valid; `intervals` then has the
+    95 % profile-likelihood interval. undetermined: parameters whose interval is more than half of
+    their domain. correlation: (K, K), NaN for a parameter without u. ratios:
+    those of the model's scales that the data determine, by name such as "ks/albedo".
     predicted: (N,) in 1/sr. u_total: (N,) in 1/sr, of each point; estimated from the residuals
     where no u is stated. residuals: (N,), measured minus predicted, less the most likely values of
     the errors that points share, in units of the independent part of u. pulls: those most likely
@@ -45,14 +74,15 @@ class FitResult:
     outliers: (N,), points that a robust fit set aside, fewer than half; they do not count in what
     follows.
     chi2, reduced_chi2: None where no u is stated; reduced_chi2 also without degrees of freedom.
-    bic, aicc: chi2 + K ln N and chi2 + 2 K N / (N - K - 1), with N ln(rss / N) for chi2 where no u
-    is stated. rms_relative: rms residual over mean BRDF; where no u is stated, less shared errors.
+    bic, aicc: -2 ln(likelihood) + K ln N, and + 2 K N / (N - K - 1): see `criteria.bic`.
+    rms_relative: rms residual over mean BRDF; where no u is stated, less shared errors.
     averaged: the model was averaged over the rig's acceptance, which is done where that matters.
     message: why the search ended.
     """
 
     model: str
     problem: Problem
+    solved: Problem
     x: FloatArray
     values: Mapping[str, float]
     u: Mapping[str, float | None]
@@ -90,69 +120,109 @@ def fit(
     model: Model,
     measurements: Measurements,
     acceptance: Acceptance | None = None,
-    smooth: Brdf | None = None,
     robust: bool = False,
 ) -> FitResult:
     """Fit a model by generalised least squares; starting values are found automatically.
 
     A first fit with the independent uncertainties gives the curve around which the covariance of
-    all stated uncertainties is linearised; `smooth` (BRDF in 1/sr, of the geometry's shape) may
-    give a better one, as when models are compared (see `covariance.full_covariance`). With an
-    `acceptance` the model is averaged over it where that changes it by more than a third of a
-    point's independent uncertainty. `robust`: large residuals count linearly (Huber 1964), and
-    those beyond 4 u are set aside and reported.
+    all stated uncertainties is linearised (`covariance.full_covariance`). With an `acceptance` the
+    model is averaged over it where that changes it by more than a third of a point's independent
+    uncertainty. `robust`: large residuals count linearly (Huber 1964), and those beyond 4 u are
+    set aside and reported.
 
     Where the model does not explain the data, its misfit counts as independent noise (Birge 1932);
     otherwise shared errors, such as that of the lamp's angle or of the tile, would have to absorb
     it with values far beyond their u. Raises `NotDetermined` when there are fewer points than
     parameters (without a stated u: no more points than parameters).
     """
-    first = first_fit(model, measurements, robust)
-    if measurements.free_levels:
-        measurements = normalise_lamp_levels(measurements, first.brdf)
-        first = first_fit(model, measurements, robust)
-    return refine(first, measurements, acceptance, smooth or first.brdf)
+    return refine(FirstFits(measurements).of(model), measurements, acceptance, robust)
 
 
 def refine(
     first: FirstFit,
     measurements: Measurements,
     acceptance: Acceptance | None,
-    smooth: Brdf,
-    ruled_out: bool = False,
+    robust: bool = False,
     profiles: bool = True,
 ) -> FitResult:
     """Refit with all uncertainties, shared ones included, and averaged where that matters.
 
-    `smooth` is a BRDF near the data, in 1/sr and of the geometry's shape. A `ruled_out` model, far
-    worse than another, is neither averaged nor profiled. Without `profiles` the interval of a
-    parameter without u is its whole domain.
+    `first` is the model's fit to the measurements with independent uncertainties. The result is
+    that of `fit`, whatever other models are compared: averaging is left out where it hardly matters
+    beside the model's own misfit. Without `profiles`, and for a model far from the data, the
+    interval of a parameter without u is its whole domain.
     """
-    if measurements.u_random is None:
-        covariance = _estimated_covariance(first, measurements, ruled_out)
-        found = _solve(first, measurements, None if ruled_out else acceptance, covariance)
-        return _result(measurements, found, covariance, profiles and not ruled_out)
-    covariance = full_covariance(measurements, smooth, first.brdf)
-    dof = max(measurements.size - first.solution.x.size, 1)
-    wider = replace(covariance, variance=covariance.variance * max(1, first.solution.chi2 / dof))
-    if ruled_out:
-        problem = replace(first.problem, covariance=wider)
-        unchanged = AveragedFit(problem, first.solution, averaged=False, converged=True)
-        return _result(measurements, unchanged, covariance, False)
-    found = _solve(first, measurements, acceptance, covariance)
-    if probability(found.solution.chi2, dof) < SIGNIFICANCE:
-        found = _solve(first, measurements, acceptance, wider)
-    return _result(measurements, found, covariance, profiles)
+    m = measurements
+    if m.free_levels:
+        m = normalise_lamp_levels(m, first.brdf)
+        first = FirstFits(m).of(first.model)
+    if robust:
+        first = huber_refit(first, m)
+    linear = _Linearised(first.problem, first.solution, first.starts)
+    if has_shared_errors(m):
+        linear = _linearised(first, _with_noise(first, m))
+    fitted = _averaged(linear, m, acceptance)
+    if m.u_random is not None and _rejected(fitted):
+        fitted = _widened(linear, fitted, m, acceptance)
+    return _result(m, fitted, linear.problem.covariance, profiles)
 
 
-def _estimated_covariance(first: FirstFit, m: Measurements, ruled_out: bool) -> Covariance:
-    """Covariance where no u is stated: 1, or estimated noise beside errors that points share."""
-    known = first.problem.covariance
-    if ruled_out or not (m.shared or m.free_levels):
-        return known
+class _Linearised(NamedTuple):
+    """A fit with all uncertainties, without averaging; `others` (K,) are further minima."""
+
+    problem: Problem
+    solution: Minimum
+    others: tuple[FloatArray, ...] = ()
+
+
+def _linearised(first: FirstFit, m: Measurements) -> _Linearised:
+    """Fit with the covariance linearised around the model's own curve, in two rounds.
+
+    A shared error may hide which minimum is the deepest: the first round searches again from the
+    lowest ones.
+    """
+    problem = replace(first.problem, covariance=full_covariance(m, first.brdf))
+    lowest = sorted(first.starts, key=problem.chi2)[:_CONTENDERS]
+    quick = min((problem.solve(x, rtol=_QUICK_RTOL) for x in lowest), key=lambda one: one.chi2)
+    if reduced_chi2(problem, quick) > _FAR_CHI2:
+        return _Linearised(problem, quick, tuple(lowest))
+    found = all_minima(problem, [quick.x, *lowest], enough_chi2(m, problem))
+    covariance = full_covariance(m, partial(problem.model_brdf, found[0].x))
+    problem = replace(problem, covariance=covariance)
+    others = tuple(other.x for other in found[1:])
+    return _Linearised(problem, deepest(problem, found[0].x, others), others)
+
+
+def _rejected(fitted: AveragedFit) -> bool:
+    found = fitted.solution
+    dof = max(fitted.problem.brdf.size - found.x.size, 1)
+    return probability(found.chi2, dof) < SIGNIFICANCE
+
+
+def _widened(
+    linear: _Linearised, fitted: AveragedFit, m: Measurements, acceptance: Acceptance | None
+) -> AveragedFit:
+    """Refit with the misfit as independent noise: its variance grows until chi2 is as expected."""
+    stated = linear.problem.covariance
+    factor = 1.0
+    for _ in range(_ROUNDS_OF_WIDENING):
+        factor *= max(1.0, reduced_chi2(fitted.problem, fitted.solution))
+        problem = replace(
+            linear.problem, covariance=replace(stated, variance=stated.variance * factor)
+        )
+        found = problem.solve(linear.solution.x)
+        fitted = _averaged(_Linearised(problem, found, linear.others), m, acceptance)
+        if reduced_chi2(fitted.problem, fitted.solution) < _WIDE_ENOUGH:
+            break
+    return fitted
+
+
+def _with_noise(first: FirstFit, m: Measurements) -> Measurements:
+    """Measurements with u_random: as stated, or estimated from the first fit."""
+    if m.u_random is not None:
+        return m
     noise = noise_variance(m, first.problem, first.solution)
-    stated = replace(m, u_random=np.sqrt(known.variance * noise))
-    return full_covariance(stated, first.brdf)
+    return replace(m, u_random=np.sqrt(first.problem.covariance.variance * noise))
 
 
 def stated_u(result: FitResult, measurements: Measurements) -> dict[str, float]:
@@ -172,30 +242,27 @@ def stated_u(result: FitResult, measurements: Measurements) -> dict[str, float]:
     return {names[i]: float(value) for i, value in zip(free, u, strict=True)}
 
 
-def _solve(
-    first: FirstFit, m: Measurements, acceptance: Acceptance | None, covariance: Covariance
-) -> AveragedFit:
-    problem = replace(first.problem, covariance=covariance)
-    # Without shared errors the first fit is the fit.
-    same = covariance.common.shape[1] == 0 and np.array_equal(
-        covariance.variance, first.problem.covariance.variance
-    )
-    solution = first.solution if same else problem.solve(first.solution.x)
+def _averaged(linear: _Linearised, m: Measurements, acceptance: Acceptance | None) -> AveragedFit:
+    problem, solution, others = linear
     if acceptance is None:
         return AveragedFit(problem, solution, averaged=False, converged=True)
-    u = covariance.u_independent * math.sqrt(noise_variance(m, problem, solution))
-    return fit_averaged(problem, solution, m, acceptance, u)
+    u = problem.covariance.u_independent * math.sqrt(noise_variance(m, problem, solution))
+    return fit_averaged(problem, solution, m, acceptance, u, others)
 
 
 def _result(
     m: Measurements, fitted: AveragedFit, covariance: Covariance, profiles: bool
 ) -> FitResult:
+    """Result with chi2 and u_total by the stated `covariance`, and u with the misfit as noise."""
     problem, found = replace(fitted.problem, covariance=covariance), fitted.solution
     x = found.x
     noise = noise_variance(m, fitted.problem, found)
     unscaled = unscaled_parameters(problem.model) if m.relative else frozenset[str]()
-    known = uncertainty(fitted.problem, found, noise, unscaled, profiles)
-    ratios = scale_ratios(fitted.problem, found, noise, profiles)
+    found = found._replace(chi2=problem.chi2(x))
+    near = m.u_random is None or reduced_chi2(problem, found) < _FAR_CHI2
+    profiles = profiles and near
+    known = uncertainty(fitted.problem, fitted.solution, noise, unscaled, profiles)
+    ratios = scale_ratios(fitted.problem, fitted.solution, noise, profiles=profiles)
     predicted = problem.predict(x)
     residual = m.brdf - predicted
     scale = math.sqrt(noise) if m.u_random is None and problem.huber is None else 1.0
@@ -204,21 +271,22 @@ def _result(
     unshared = own / (covariance.u_independent * scale)
     outliers = _outliers(unshared) if problem.huber else np.zeros(m.size, dtype=bool)
     good = ~outliers
-    white = covariance.subset(good).whiten(residual[good])
+    kept = covariance.subset(good) if np.any(outliers) else covariance
+    white = kept.whiten(residual[good])
     chi2 = float(white @ white)
     dof = int(np.sum(good)) - x.size
     stated = m.u_random is not None
     mean = float(np.mean(m.brdf[good]))
     rms = float(np.sqrt(np.mean(np.square((residual if stated else own)[good]))))
-    found = found._replace(chi2=problem.chi2(x))
     return FitResult(
         model=problem.model.name,
         problem=problem,
+        solved=fitted.problem,
         x=x,
         values=dict(zip(known.u, map(float, x), strict=True)),
         u=known.u,
         intervals=known.intervals,
-        undetermined=known.undetermined,
+        undetermined=known.undetermined if near else (),
         correlation=known.correlation,
         ratios=ratios,
         predicted=predicted,

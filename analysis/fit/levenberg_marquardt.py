@@ -25,7 +25,8 @@ HUBER = 1.345
 RTOL = 1e-10
 """The search ends with a step that lowers chi2 by no more than this fraction of it."""
 
-_MAX_STEPS = 100
+MAX_STEPS = 100
+
 _NEGLIGIBLE = 1e-13  # fraction of chi2: a smaller predicted decrease may be hidden by rounding
 _ZERO = 1e-26  # a chi2 below this fraction of the first one is rounding
 # Cosine between residual and gradient below which a point is stationary (Moré 1978, section 4);
@@ -113,6 +114,7 @@ def descend(
     huber: float | None = None,
     atol: float = 0.0,
     rtol: float = RTOL,
+    most_steps: int = MAX_STEPS,
 ) -> Minimum:
     """Minimise `loss` of `residual(x)` (N,), in units of u, from `start` with low <= x <= high.
 
@@ -130,7 +132,7 @@ def descend(
     chi2 = loss(r, huber)
     first, damping = chi2, _FIRST_DAMPING
     model = quadratic(x, r)
-    for _ in range(_MAX_STEPS):
+    for _ in range(most_steps):
         if model.stationary(chi2, _STATIONARY):
             return Minimum(x, chi2, True, "the gradient is zero")
         step = _damped_step(model, damping)
@@ -151,7 +153,7 @@ def descend(
             return Minimum(x, chi2, model.stationary_to_rounding(chi2), _NO_STEP)
         else:
             damping *= 10
-    return Minimum(x, chi2, False, f"chi2 has not converged in {_MAX_STEPS} steps")
+    return Minimum(x, chi2, False, f"chi2 has not converged in {most_steps} steps")
 
 
 def _damped_step(model: _Quadratic, damping: float) -> FloatArray:
@@ -202,4 +204,4 @@ def _step_in_face(
 def _solve_scaled(A: FloatArray, b: FloatArray) -> FloatArray:
     """A^-1 b of a positive matrix, solved in units in which its diagonal is 1."""
     scale = np.sqrt(np.diag(A))
-    return np.asarray(np.linalg.solve(A / np.outer(scale, scale), b / scale) / scale)
+    return np.asarray(np.linalg.solve(A / scale / scale[:, np.newaxis], b / scale) / scale)

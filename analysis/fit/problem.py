@@ -8,13 +8,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from analysis.data.covariance import Covariance
-from analysis.fit.levenberg_marquardt import RTOL, Minimum, descend, loss
+from analysis.fit.levenberg_marquardt import MAX_STEPS, RTOL, Minimum, descend, loss
 from analysis.models import Model
 from instrument.geometry import BoolArray, FloatArray, Geometry
 
 # Distance by which a parameter is moved off a bound where its derivative is zero, as a fraction of
 # its domain; relative decrease of chi2 from which the search from there counts as better.
 _OFF_BOUND, _BETTER = 1e-3, 1e-9
+# Least value of a parameter that is searched for by its logarithm, as a fraction of its upper
+# bound, where the domain begins at 0.
+_LEAST_LOGARITHM = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +79,17 @@ class Problem:
         return self.covariance.whiten(np.stack(columns, axis=1))
 
     def solve(
-        self, start: FloatArray, held: Iterable[int] = (), atol: float = 0.0, rtol: float = RTOL
+        self,
+        start: FloatArray,
+        held: Iterable[int] = (),
+        atol: float = 0.0,
+        rtol: float = RTOL,
+        most_steps: int = MAX_STEPS,
     ) -> Minimum:
         """Find the minimum from `start` (K,), with the parameters of the indices `held` fixed.
 
-        The search ends with a step that lowers chi2 by no more than `atol`, or the fraction `rtol`.
+        The search ends with a step that lowers chi2 by no more than `atol`, or the fraction `rtol`,
+        or after `most_steps`.
         A rough surface depends on the square of its roughness: at zero roughness the derivative is
         zero, even where larger values fit better. From such a bound the search is repeated from a
         point a little off it.
@@ -89,11 +98,11 @@ class Problem:
         free = [i for i in range(start.size) if i not in held]
         if not free:
             return Minimum(start, self.chi2(start), True, "no parameter is free")
-        found = self._descend(start, free, atol, rtol)
+        found = self._descend(start, free, atol, rtol, most_steps)
         off = self.off_flat_bounds(found.x, free)
         if np.array_equal(off, found.x):
             return found
-        other = self._descend(off, free, atol, rtol)
+        other = self._descend(off, free, atol, rtol, most_steps)
         return other if other.chi2 < found.chi2 * (1 - _BETTER) else found
 
     def off_flat_bounds(self, x: FloatArray, free: Sequence[int]) -> FloatArray:
@@ -111,12 +120,16 @@ class Problem:
         inside[flat] = np.clip(x, self.low + step, self.high - step)[flat]
         return inside
 
-    def _descend(self, start: FloatArray, free: list[int], atol: float, rtol: float) -> Minimum:
+    def _descend(
+        self, start: FloatArray, free: list[int], atol: float, rtol: float, most_steps: int
+    ) -> Minimum:
         """Search over the free parameters, those marked logarithmic by their logarithms."""
         by_log = np.array([self.model.parameters[i].logarithmic for i in free])
+        least = _LEAST_LOGARITHM * self.high[free]
 
         def searched(x: FloatArray) -> FloatArray:
-            return np.where(by_log, np.log(np.where(by_log, x[free], 1.0)), x[free])
+            positive = np.where(by_log, np.maximum(x[free], least), 1.0)
+            return np.where(by_log, np.log(positive), x[free])
 
         def full(y: FloatArray) -> FloatArray:
             x = start.copy()
@@ -137,6 +150,7 @@ class Problem:
             self.huber,
             atol,
             rtol,
+            most_steps,
         )
         return found._replace(x=full(found.x))
 

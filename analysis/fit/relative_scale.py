@@ -57,6 +57,12 @@ def relative_model(model: Model, values: FloatArray) -> Model:
     low, high = middle / _SPAN, middle * _SPAN
     factor = Parameter(FACTOR_NAME, "sr", low, high, middle, starts=(middle,), logarithmic=True)
 
+    return _scaled(model, factor)
+
+
+def _scaled(model: Model, factor: Parameter) -> Model:
+    """The model, and each of its terms, times the factor."""
+
     def kernel(geometry: Geometry, **parameters: float) -> FloatArray:
         per_brdf = parameters.pop(FACTOR_NAME)
         return per_brdf * model.kernel(geometry, **parameters)
@@ -77,5 +83,5 @@ def relative_model(model: Model, values: FloatArray) -> Model:
         kernel=kernel,
         gradient_kernel=gradients,
         validity_kernel=None,
-        terms=(),
+        terms=tuple(_scaled(term, factor) for term in model.terms),
     )

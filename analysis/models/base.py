@@ -63,9 +63,12 @@ class Parameter:
 
     `unit` is as people write it ("1" for a pure number). `scale`: its part of the BRDF rises about
     in proportion to it from zero, so that a fit solves for its first value instead of searching.
+    `level`: it rises from zero with it, but not in proportion: a fit first adjusts it to the level
+    of the data, and then searches for all. `scanned`: chi2 has several minima along it, so that a
+    fit looks for others on the line through the one that it has found.
     `starts`: values from which a fit starts the search; by default seven over the domain, denser
     towards its low end, as narrow lobes are easier to miss than wide ones. `logarithmic`: a fit
-    searches for its logarithm; the domain then begins above 0.
+    searches for its logarithm; the domain then begins at 0 or above.
     """
 
     name: str
@@ -76,6 +79,8 @@ class Parameter:
     scale: bool = False
     starts: tuple[float, ...] = ()
     logarithmic: bool = False
+    level: bool = False
+    scanned: bool = False
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
@@ -93,9 +98,9 @@ class Parameter:
                 f"{self.name}: lower bound {self.low:g}, default {self.default:g}; allowed for a "
                 "scale: a lower bound of 0 or more and a default above it"
             )
-        if self.logarithmic and self.low <= 0:
+        if self.logarithmic and self.low < 0:
             raise ValueError(
-                f"{self.name}: lower bound {self.low:g}; allowed, as it is logarithmic: above 0"
+                f"{self.name}: lower bound {self.low:g}; allowed, as it is logarithmic: 0 or above"
             )
 
     def check(self, value: float) -> float:

@@ -32,9 +32,9 @@ from analysis.models.validity import GRAZING, both_graze, valid_except
 from instrument.geometry import FloatArray, Geometry, IntArray
 
 SINGLE_SCATTERING_ALBEDO = Parameter(
-    "single_scattering_albedo", "1", 0.0, 1.0, 0.9, starts=(0.3, 0.7, 0.95, 0.999)
+    "single_scattering_albedo", "1", 0.0, 1.0, 0.9, starts=(0.3, 0.7, 0.95, 0.999), level=True
 )
-N = Parameter("n", "1", 1.0, 3.0, 1.5, starts=(1.2, 1.5, 2.2))
+N = Parameter("n", "1", 1.0, 3.0, 1.5, starts=(1.15, 1.5, 2.0, 2.7), scanned=True)
 
 # K's integrand has poles as near to 0 as the critical cosine: from this n on 40 nodes, clustered at
 # 0 where H has a term x ln(x), are enough for 1e-11; below it the tanh rule is used, which

@@ -3,23 +3,44 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import chi2, multivariate_normal, norm
 
 from analysis.choice.choice import choose
+from analysis.data.covariance import Covariance
 from analysis.data.measurements import Measurements
-from analysis.fit.criteria import LEAST_NOISE, probability
+from analysis.fit.criteria import LEAST_NOISE, bic, probability
 from analysis.fit.fit import fit
 from analysis.models import MODELS
 from tests.support.analysis.seeded_scan import scan
 
 
-def test_bic_with_stated_u_is_chi2_plus_penalty() -> None:
+def test_bic_with_stated_u_is_the_likelihood_plus_penalty() -> None:
+    """-2 ln(likelihood) of a normal distribution, less that of no residual and no shared error."""
     m = scan("lambert", 1, albedo=0.8)
+    assert m.u_random is not None
     for c in choose(m, models=["lambert", "oren_nayar"]).candidates:
-        assert c.bic == pytest.approx((c.chi2 or 0) + len(c.values) * math.log(m.size))
+        C = np.diag(c.problem.covariance.variance)
+        C += c.problem.covariance.common @ c.problem.covariance.common.T
+        found = multivariate_normal.logpdf(m.brdf, c.predicted, C)
+        best = np.sum(norm.logpdf(0.0, scale=m.u_random))
+        penalty = len(c.values) * math.log(m.size)
+        assert c.bic == pytest.approx(-2 * (found - best) + penalty, abs=1e-6)
+
+
+def test_a_covariance_that_is_too_large_costs_more_than_it_saves() -> None:
+    """Ten times the stated u explains any residuals, and is less likely."""
+    m = scan("lambert", 1, albedo=0.8, u_tile=0.0, u_deg=0.0)
+    stated = fit(MODELS["lambert"], m)
+    wide = replace(
+        stated.problem,
+        covariance=Covariance(100 * stated.problem.covariance.variance, np.zeros((m.size, 0))),
+    )
+    assert wide.chi2(stated.x) < 0.011 * (stated.chi2 or 0)
+    assert bic(m, wide, wide.solve(stated.x)) > stated.bic + 100
 
 
 def test_without_stated_u_the_criteria_use_the_residual_sum_of_squares() -> None:

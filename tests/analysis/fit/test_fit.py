@@ -11,7 +11,9 @@ from analysis.data.curet import read_curet
 from analysis.data.measurements import Measurements, SharedError
 from analysis.fit.fit import fit, stated_u
 from analysis.models import MODELS
-from tests.support.analysis.seeded_scan import GLOSSY, scan
+from analysis.models.special_cases import special_cases
+from tests.support.analysis.random_fits import Case, random_case
+from tests.support.analysis.seeded_scan import GLOSSY, RIG, scan
 from tests.support.paths import ROOT
 
 
@@ -94,6 +96,53 @@ def test_stated_u_is_that_of_the_fit_and_empty_where_nothing_is_determined() -> 
     assert stated_u(found, m) == pytest.approx(dict(found.u), rel=0.01)
     relative = replace(m, relative=True)
     assert stated_u(fit(MODELS["lambert"], relative), relative) == {}
+
+
+FOAM = "oren_nayar+torrance_sparrow"
+
+
+@pytest.mark.parametrize("part", ["whole", "mirror half", "first 19", "first 23"])
+def test_foam_at_one_incidence_is_found(part: str) -> None:
+    """The widths of lobes for which few points count lie between values 10 degrees apart."""
+    truth = {"albedo": 0.8, "sigma_deg": 20.0, "ks": 0.076}
+    for seed in range(2):
+        m = scan(FOAM, seed, u_relative=5e-5, acceptance=RIG, **truth)
+        m = m.subset(m.theta_i_deg == 30)
+        order = np.arange(m.size)
+        parts = {"whole": order >= 0, "mirror half": m.theta_r_deg <= 0}
+        parts |= {"first 19": order < 19, "first 23": order < 23}
+        found = fit(MODELS[FOAM], m.subset(parts[part]), RIG)
+        assert 0 < (found.reduced_chi2 or 9) < 2.2
+        for name, value in truth.items():
+            assert found.values[name] == pytest.approx(value, abs=4 * (found.u[name] or 0))
+
+
+AS_LOW = 1 + 1e-6
+
+
+def random_cases(slow: bool) -> list[Case]:
+    """Seeded cases with two points more than parameters: 8, or with `pytest --slow` 2 000."""
+    cases = map(random_case, range(2200 if slow else 9))
+    return [case for case in cases if case.measurements.size >= case.truth.size + 2][:2000]
+
+
+@pytest.mark.slow
+def test_no_fit_is_above_the_truth_nor_above_a_special_case(slow: bool) -> None:
+    """chi2 of the fit's own final problem, at the truth and at the fits of its special cases."""
+    missed = []
+    for case in random_cases(slow):
+        found = fit(case.model, case.measurements)
+        least, solved = found.solved.chi2(found.x), found.solved
+        if least > solved.chi2(case.truth) * AS_LOW:
+            missed.append(f"{case}: {least / solved.chi2(case.truth):g} of the truth's chi2")
+        for special in special_cases(case.model.name):
+            values = fit(MODELS[special.name], case.measurements).values
+            at = special.embed(values, case.model)
+            x = np.array([at[p.name] for p in case.model.parameters])
+            inside = np.all((solved.low <= x) & (x <= solved.high))
+            if inside and least > solved.chi2(x) * AS_LOW:
+                missed.append(f"{case}: {least / solved.chi2(x):g} of the chi2 of {special.name}")
+    assert not missed, missed
 
 
 CURET = ROOT.parent / "shared" / "data" / "curet"
