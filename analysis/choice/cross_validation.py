@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.data.measurements import Measurements
 from analysis.data.sweeps import signed_view
-from analysis.fit.problem import Problem
+from analysis.fit.search.problem import Problem
 from instrument.geometry import BoolArray, FloatArray, IntArray
 
 MAX_FOLDS = 5

@@ -15,9 +15,9 @@ import numpy as np
 from analysis.data.acceptance import Acceptance, averaged_brdf, required_rings
 from analysis.data.measurements import Measurements
 from analysis.fit.criteria import reduced_chi2
-from analysis.fit.first_fit import deepest
-from analysis.fit.levenberg_marquardt import Minimum
-from analysis.fit.problem import Problem
+from analysis.fit.search.levenberg_marquardt import Minimum
+from analysis.fit.search.minima import deepest
+from analysis.fit.search.problem import Problem
 from instrument.geometry import FloatArray, Geometry, IntArray
 
 MAX_ROUNDS = 12

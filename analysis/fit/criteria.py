@@ -10,8 +10,8 @@ import math
 import numpy as np
 
 from analysis.data.measurements import Measurements
-from analysis.fit.levenberg_marquardt import Minimum, weights
-from analysis.fit.problem import Problem
+from analysis.fit.search.levenberg_marquardt import Minimum, weights
+from analysis.fit.search.problem import Problem
 from instrument.geometry import FloatArray
 
 # Below what any camera resolves: smaller residuals, relative to the mean BRDF, are rounding.

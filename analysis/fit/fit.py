@@ -28,17 +28,12 @@ from analysis.fit.criteria import (
     probability,
     reduced_chi2,
 )
-from analysis.fit.first_fit import (
-    FirstFit,
-    FirstFits,
-    all_minima,
-    deepest,
-    huber_refit,
-)
-from analysis.fit.levenberg_marquardt import Minimum
-from analysis.fit.problem import Problem
+from analysis.fit.first_fit import FirstFit, FirstFits, huber_refit
 from analysis.fit.relative_scale import normalise_lamp_levels, unscaled_parameters
 from analysis.fit.scale_ratios import Ratio, scale_ratios
+from analysis.fit.search.levenberg_marquardt import Minimum
+from analysis.fit.search.minima import all_minima, deepest
+from analysis.fit.search.problem import Problem
 from analysis.fit.uncertainty import uncertainty
 from analysis.models import Model
 from analysis.models.base import Validity

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.fit.levenberg_marquardt import Minimum
-from analysis.fit.problem import Problem
+from analysis.fit.search.levenberg_marquardt import Minimum
+from analysis.fit.search.problem import Problem
 from instrument.geometry import FloatArray
 
 RISE_95 = 3.84

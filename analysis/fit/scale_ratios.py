@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.fit.levenberg_marquardt import Minimum
-from analysis.fit.problem import Problem
+from analysis.fit.search.levenberg_marquardt import Minimum
+from analysis.fit.search.problem import Problem
 from analysis.fit.uncertainty import uncertainty
 from analysis.models import Model, Parameter
 from instrument.geometry import FloatArray, Geometry

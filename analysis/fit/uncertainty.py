@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.fit.levenberg_marquardt import Minimum
-from analysis.fit.problem import Problem
 from analysis.fit.profile_likelihood import RISE_95, interval
+from analysis.fit.search.levenberg_marquardt import Minimum
+from analysis.fit.search.problem import Problem
 from instrument.geometry import BoolArray, FloatArray
 
 # Singular values below this fraction of the largest: a combination that is not determined.

@@ -30,7 +30,7 @@ from acquisition.benchmark.study import Study
 from acquisition.benchmark.trial import Trial, select
 from analysis.data.measurements import Measurements
 from analysis.fit.first_fit import first_fit
-from analysis.fit.problem import Problem
+from analysis.fit.search.problem import Problem
 from instrument.geometry import FloatArray
 
 MISSED_U = 0.1

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.data.covariance import Covariance
-from analysis.fit.problem import Problem
-from analysis.fit.starting_values import bounded_least_squares, starting_values
+from analysis.fit.search.problem import Problem
+from analysis.fit.search.starting_values import bounded_least_squares, starting_values
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
 

@@ -32,7 +32,7 @@ from acquisition.rig import open_devices
 from analysis.data.acceptance import Acceptance
 from analysis.data.covariance import Covariance
 from analysis.fit.fit import fit, stated_u
-from analysis.fit.problem import Problem
+from analysis.fit.search.problem import Problem
 from analysis.models import MODELS
 from instrument.config.load import Loaded
 from instrument.config.protocol import SimulatedSample

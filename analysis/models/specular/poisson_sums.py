@@ -36,7 +36,7 @@ def poisson_sum(g: FloatArray, q: FloatArray, weight: Weight) -> FloatArray:
 
 
 def poisson_sums(g: FloatArray, q: FloatArray, weights: Sequence[Weight]) -> list[FloatArray]:
-    """`poisson_sum` for each of the weights, of the shape to which `g` and `q` broadcast."""
+    """`poisson_sum` for each of the weights: dimensionless, `g` and `q` broadcast to the shape."""
     g, q = np.broadcast_arrays(g, q)
     flat_g, flat_q = g.ravel(), q.ravel()
     total = np.empty((len(weights), flat_g.size))

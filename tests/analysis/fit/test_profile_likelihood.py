@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from analysis.data.covariance import Covariance
-from analysis.fit.problem import Problem
 from analysis.fit.profile_likelihood import interval
+from analysis.fit.search.problem import Problem
 from analysis.models import MODELS
 from instrument.geometry import Geometry
 

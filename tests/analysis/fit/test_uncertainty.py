@@ -21,7 +21,7 @@ from analysis.choice.ladder import CANDIDATES, physics
 from analysis.data.covariance import independent_covariance
 from analysis.data.measurements import Measurements
 from analysis.fit.fit import FitResult, fit
-from analysis.fit.problem import Problem
+from analysis.fit.search.problem import Problem
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
 from tests.support.analysis.seeded_scan import RIG, noisy_sweeps, scan

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from analysis.data.acceptance import Acceptance, averaged_brdf
 from analysis.data.covariance import Covariance
 from analysis.data.measurements import Measurements, SharedError, setting_numbers
-from analysis.fit.problem import Problem
+from analysis.fit.search.problem import Problem
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
 

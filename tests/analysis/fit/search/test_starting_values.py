@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear, nnls
 
-from analysis.fit.starting_values import bounded_least_squares, starting_values
+from analysis.fit.search.starting_values import bounded_least_squares, starting_values
 from analysis.models import MODELS
 from instrument.geometry import FloatArray
 from tests.support.analysis.seeded_scan import noise_free, problem_of

@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 
 from analysis.data.covariance import Covariance
-from analysis.fit.problem import Problem
+from analysis.fit.search.problem import Problem
 from analysis.models import Model, Parameter
 from instrument.geometry import BoolArray, FloatArray, IntArray
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from analysis.data.covariance import Covariance
-from analysis.fit.levenberg_marquardt import MAX_STEPS, RTOL, Minimum, descend, loss
+from analysis.fit.search.levenberg_marquardt import MAX_STEPS, RTOL, Minimum, descend, loss
 from analysis.models import Model
 from instrument.geometry import BoolArray, FloatArray, Geometry
 

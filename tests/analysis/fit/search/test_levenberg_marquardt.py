@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import OptimizeResult, least_squares, lsq_linear
 
-from analysis.fit.levenberg_marquardt import HUBER, Minimum, descend, loss, weights
+from analysis.fit.search.levenberg_marquardt import HUBER, Minimum, descend, loss, weights
 from instrument.geometry import FloatArray
 from tests.support.models.derivatives import central_difference
 

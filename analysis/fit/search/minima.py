@@ -1,0 +1,221 @@
+"""Local minima of chi2 from several starts: of one problem, and the deepest of them.
+
+Every start is first followed roughly; ends that may be the deepest are searched to the end, and
+beside them: along a parameter with several minima, and across a valley that the data hardly
+determine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from analysis.fit.search.levenberg_marquardt import Minimum
+from analysis.fit.search.problem import Problem
+from analysis.fit.search.starting_values import values_between
+from instrument.geometry import FloatArray
+
+# Relative tolerance of chi2, and the most steps, of the search from every start. A minimum that is
+# above the best by no more than such a fraction, or an unfinished one, is searched to the end.
+_QUICK_RTOL, _QUICK_STEPS = 1e-3, 30
+_CLOSE, _UNFINISHED = 0.1, 1.0
+# A search from a further start ends with a step that lowers chi2 by this fraction of the best.
+_CRAWLING = 0.1
+# Starts that lead to the same chi2, but for this fraction of it, after which no other is expected
+# to explain the data better.
+_AGREEING, _ALIKE = 2, 2e-3
+# Relative tolerance with which the level alone is adjusted.
+_LEVEL_RTOL = 1e-2
+# Steps between the `starts` of a parameter that is scanned, and the relative tolerance there.
+_SCAN_STEPS, _SCAN_RTOL = 4, 0.1
+# Further searches along a valley that one search does not reach the end of; distance of minima that
+# count as one, as a fraction of the domain.
+_VALLEY, _BESIDE = 5, 1e-3
+# chi2, relative to that of a model that explains the data, up to which a valley is crossed.
+_NEARLY = 2.0
+# Distance to either side of a minimum at which chi2 is looked at, in u, and the factor by which its
+# rise there may differ from that of a parabola; least curvature, relative to the largest.
+_FAR_U, _BENT, _FLAT = 3.0, 2.0, 1e-12
+# Step of a finite difference, relative to the distance from the nearer bound; that distance, as a
+# fraction of the domain, below which a parameter counts as on the bound; second derivative of chi2,
+# in u^2 per unit^2, that underflows.
+_DIFFERENCE, _ON_BOUND, _NO_CURVATURE = 1e-5, 1e-6, 1e-200
+# Relative decrease of chi2 from which another point counts as lower.
+LOWER = 1e-9
+
+
+def all_minima(
+    problem: Problem, starts: Sequence[FloatArray], enough: float = 0.0
+) -> list[Minimum]:
+    """Minima of a problem from all starts, the deepest first; it and any as deep to the end.
+
+    Starts are parameters (K,) in the model's units, `enough` is in units of u^2. The search ends
+    where several starts have led to the same minimum with a chi2 of `enough`.
+    """
+    found = _rough_minima(problem, starts, enough)
+    beside = [_rough_minimum(problem, start) for start in _starts_beside(problem, found[0].x)]
+    found = sorted([*found, *beside], key=_depth)
+    done = [to_the_end(problem, found[0].x)]
+    for one in found[1:]:
+        above = (_CLOSE if one.converged else _UNFINISHED) * found[0].chi2 + enough
+        if one.chi2 <= found[0].chi2 + above and not _reached(problem, one, done):
+            done.append(to_the_end(problem, one.x))
+    lowest = min(done, key=_depth)
+    if lowest.chi2 <= _NEARLY * enough:
+        done.append(_across_the_valley(problem, lowest))
+    return _distinct(problem, sorted([*done, *found], key=_depth))
+
+
+def _rough_minima(problem: Problem, starts: Sequence[FloatArray], enough: float) -> list[Minimum]:
+    found: list[Minimum] = []
+    for start in starts:
+        crawling = _CRAWLING * found[0].chi2 if found else 0.0
+        found = sorted([*found, _rough_minimum(problem, start, crawling)], key=_depth)
+        agreeing = sum(one.chi2 <= found[0].chi2 * (1 + _ALIKE) for one in found)
+        if found[0].chi2 <= enough and agreeing >= _AGREEING:
+            break
+    return found
+
+
+def _rough_minimum(problem: Problem, start: FloatArray, atol: float = 0.0) -> Minimum:
+    x = _levelled(problem, start)
+    return problem.solve(x, atol=atol, rtol=_QUICK_RTOL, most_steps=_QUICK_STEPS)
+
+
+def _across_the_valley(problem: Problem, found: Minimum) -> Minimum:
+    """The minimum, or a lower one beside it along the direction that the data determine least.
+
+    Along a long valley noise makes several minima. There chi2 does not rise by k^2 at k u, as it
+    does where the model is linear: only then is there another search.
+    """
+    for _ in range(_VALLEY):
+        lower = found
+        for step in _weakest_direction(problem, found.x):
+            x = np.clip(found.x + _FAR_U * step, problem.low, problem.high)
+            rise = (problem.chi2(x) - found.chi2) / _FAR_U**2
+            if not 1 / _BENT < rise < _BENT:
+                lower = min(lower, problem.solve(x), key=_depth)
+        if lower.chi2 >= found.chi2 * (1 - LOWER):
+            break
+        found = lower
+    return found
+
+
+def _weakest_direction(problem: Problem, x: FloatArray) -> list[FloatArray]:
+    """Steps of one u from x (K,), to either side, along the least determined combination.
+
+    Of the parameters in units of what each changes alone; none where it changes nothing.
+    """
+    J = problem.jacobian(x)
+    size = np.linalg.norm(J, axis=0)
+    moving = (size > 0) & (x > problem.low) & (x < problem.high)
+    if not np.any(moving):
+        return []
+    J = J[:, moving] / size[moving]
+    values, vectors = np.linalg.eigh(J.T @ J)
+    step = np.zeros_like(x)
+    step[moving] = vectors[:, 0] / np.sqrt(max(values[0], _FLAT)) / size[moving]
+    return [step, -step]
+
+
+def _starts_beside(problem: Problem, x: FloatArray) -> Iterator[FloatArray]:
+    """Starts near other minima along the axes of the parameters that are scanned for them."""
+    for i, parameter in enumerate(problem.model.parameters):
+        if parameter.scanned:
+            values = np.array(values_between(parameter, _SCAN_STEPS))
+            at = np.searchsorted(values, x[i])
+            up = list(_profile(problem, x, i, values[at:]))
+            down = list(_profile(problem, x, i, values[:at][::-1]))
+            line = [*down[::-1], Minimum(x, problem.chi2(x), True, ""), *up]
+            chi2 = np.array([np.inf, *(one.chi2 for one in line), np.inf])
+            low = (chi2[1:-1] < chi2[:-2]) & (chi2[1:-1] < chi2[2:])
+            low[len(down)] = False
+            yield from (one.x for one, lower in zip(line, low, strict=True) if lower)
+
+
+def _profile(problem: Problem, x: FloatArray, index: int, values: FloatArray) -> Iterator[Minimum]:
+    """Rough minima over the other parameters at the values of one, each from the one before it."""
+    for value in values:
+        x = x.copy()
+        x[index] = value
+        found = problem.solve(x, (index,), rtol=_SCAN_RTOL)
+        yield found
+        x = found.x
+
+
+def _levelled(problem: Problem, x: FloatArray) -> FloatArray:
+    """Start x (K,) with the level adjusted to the data, and the scales with it, shapes held."""
+    parameters = problem.model.parameters
+    if not any(p.level for p in parameters):
+        return x
+    shapes = [i for i, p in enumerate(parameters) if not (p.scale or p.level)]
+    return problem.solve(x, shapes, rtol=_LEVEL_RTOL).x
+
+
+def to_the_end(problem: Problem, x: FloatArray) -> Minimum:
+    """Minimum from x (K,), in the model's units, by Newton's steps where Gauss and Newton's crawl.
+
+    The latter leave out the model's second derivatives, which count where residuals are large.
+    """
+    found = problem.solve(x, most_steps=_QUICK_STEPS)
+    for _ in range(_VALLEY):
+        if found.converged:
+            break
+        found = problem.solve(_newton_step(problem, found))
+    return found
+
+
+def _newton_step(problem: Problem, found: Minimum) -> FloatArray:
+    """Parameters (K,) after a step with all second derivatives, or those of `found` if higher."""
+    x = found.x
+    distance = np.minimum(x - problem.low, problem.high - x)
+    inside = distance > _ON_BOUND * (problem.high - problem.low)
+    free = np.flatnonzero(inside & problem.jacobian(x).any(axis=0))
+
+    def gradient(x: FloatArray) -> FloatArray:
+        return problem.jacobian(x, free.tolist()).T @ problem.residual(x)
+
+    here, H = gradient(x), np.empty((free.size, free.size))
+    for k, i in enumerate(free):
+        moved = x.copy()
+        moved[i] += _DIFFERENCE * distance[i]
+        H[k] = (gradient(moved) - here) / (moved[i] - x[i])
+    size = np.sqrt(np.maximum(np.abs(np.diag(H)), _NO_CURVATURE))
+    values, vectors = np.linalg.eigh((H + H.T) / 2 / np.outer(size, size))
+    if free.size == 0 or values[0] <= _FLAT:
+        return x
+    new = x.copy()
+    new[free] -= vectors @ ((vectors.T @ (here / size)) / values) / size
+    new = np.clip(new, problem.low, problem.high)
+    return new if problem.chi2(new) < found.chi2 else x
+
+
+def deepest(problem: Problem, x: FloatArray, others: Iterable[FloatArray]) -> Minimum:
+    """Minimum from x (K,), in the model's units, or from any of the others that lies lower."""
+    found = to_the_end(problem, x)
+    for other in others:
+        if problem.chi2(other) < found.chi2 * (1 - LOWER):
+            found = min(found, to_the_end(problem, other), key=_depth)
+    return found
+
+
+def _depth(minimum: Minimum) -> float:
+    return minimum.chi2
+
+
+def _distinct(problem: Problem, found: Iterable[Minimum]) -> list[Minimum]:
+    """Minima, lowest first, without those beside one before them."""
+    kept: list[Minimum] = []
+    for one in found:
+        if not _reached(problem, one, kept):
+            kept.append(one)
+    return kept
+
+
+def _reached(problem: Problem, one: Minimum, others: Iterable[Minimum]) -> bool:
+    """True if one of the others is no higher and lies within a small part of the domain of it."""
+    near = _BESIDE * (problem.high - problem.low)
+    return any(
+        other.chi2 <= one.chi2 and bool(np.all(np.abs(one.x - other.x) <= near)) for other in others
+    )
