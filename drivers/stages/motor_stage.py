@@ -277,6 +277,7 @@ class MotorStage(ABC):
         except (Stopped, ComputerPaused):
             raise
         except DeviceError as error:
+            self.watchdog.check()  # its own thread may wake later than this one
             if not self.watchdog.fired:
                 raise
             kind = ComputerPaused if self.watchdog.paused_s else type(error)

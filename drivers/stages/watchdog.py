@@ -47,7 +47,7 @@ class Watchdog:
         self.silent_s = silence_allowed_s(reply_s)
         self._probe_before_s = self.silent_s - reply_s - _AFTER_PROBE_S
         self._name, self._probe, self._stop, self._clock = name, probe, stop, clock
-        self._asking = threading.Lock()
+        self._asking, self._firing = threading.Lock(), threading.Lock()
         self._over = threading.Event()
         self._over.set()
         self._answered_s = 0.0
@@ -82,17 +82,26 @@ class Watchdog:
             self._answered_s = self._clock.now_s()
             return status
 
+    def check(self) -> None:
+        """Stop the motion, once, if the time allowed is up."""
+        with self._firing:
+            silent_s = self._silent_s
+            if self._over.is_set() or silent_s <= self.silent_s:
+                return
+            paused_s = self._meter.paused_since_s(self._answered_s)
+            self.paused_s = paused_s if silent_s - paused_s <= self.silent_s else 0.0
+            self.fired = True
+            self._over.set()
+        self._stop()
+
+    @property
+    def _silent_s(self) -> float:
+        return self._clock.now_s() - self._answered_s
+
     def _watch(self, over: threading.Event) -> None:
         while not over.wait(_TICK_S):
-            silent_s = self._clock.now_s() - self._answered_s
-            if silent_s > self.silent_s:
-                paused_s = self._meter.paused_since_s(self._answered_s)
-                self.paused_s = paused_s if silent_s - paused_s <= self.silent_s else 0.0
-                self.fired = True
-                over.set()
-                self._stop()
-                return
-            if _PROBE_AFTER_S < silent_s < self._probe_before_s:
+            self.check()
+            if _PROBE_AFTER_S < self._silent_s < self._probe_before_s:
                 self._probe_unless_polled()
 
     def _probe_unless_polled(self) -> None:

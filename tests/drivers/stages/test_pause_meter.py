@@ -145,6 +145,20 @@ def test_answers_that_are_lost_in_a_pause_are_no_fault_of_the_line(setup: Setup)
     assert setup.moves_on()
 
 
+@pytest.mark.parametrize("setup", ["oriental rtu"], indirect=True)
+def test_a_pause_is_named_also_if_the_watchdogs_thread_wakes_last(
+    setup: Setup, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(setup.stage.watchdog, "_watch", lambda over: over.wait(5))
+    setup.line.command, setup.line.lost = b"\x10\x00\x58", True
+    setup.line.noted.set()
+    with pytest.raises(ComputerPaused, match=r"theta_r: .*the computer paused for 1.3 s"):
+        setup.stage.start_move(70.0)
+    wait_until(lambda: not setup.motor.moving)
+    monkeypatch.undo()
+    assert setup.moves_on()
+
+
 @pytest.mark.parametrize("setup", ["newport"], indirect=True)
 def test_the_watchdogs_stop_does_not_end_the_next_move(
     setup: Setup, monkeypatch: pytest.MonkeyPatch
