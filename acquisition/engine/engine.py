@@ -68,10 +68,12 @@ class Engine:
         self._ended = False
         note = partial(self._add_event, OPERATOR)
         self._positioner = Positioner(rig, devices.axes, devices.lamp, devices.operator, note)
-        self._begun_step = (0, 0.0, 0.0)  # its index, and its begin in scan time and connected time
+        self._begun_step = (0, 0.0, 0.0)  # its index, and its begin in scan time and running time
         wait_s, clock = rig.camera.reconnect_s, devices.clock
         camera = RetryingCamera(devices.camera, clock, wait_s, self._continue_step)
-        self._exposer = Exposer(camera, devices.lamp, clock, protocol, rig, record)
+        self._exposer = Exposer(
+            camera, devices.lamp, clock, protocol, rig, record, self._continue_step
+        )
 
     def run(self, plan: Plan, progress: Progress | None = None) -> None:
         """Run all steps, or resume a stopped scan with the steps missing from its progress.
@@ -179,13 +181,13 @@ class Engine:
         self._accept(waiting)
 
     def _begin_step(self, index: int, scan_s: float) -> None:
-        self._begun_step = (index, scan_s, self._exposer.connected_s())
+        self._begun_step = (index, scan_s, self._exposer.running_s())
         self._devices.begin_step(index, scan_s)
 
     def _continue_step(self) -> None:
-        """Tell a simulated scene that waiting for a lost camera is no scan time."""
+        """Tell a simulated scene that a pause is no scan time: a wait, a check of an exposure."""
         index, scan_s, begun_s = self._begun_step
-        self._devices.begin_step(index, scan_s + self._exposer.connected_s() - begun_s)
+        self._devices.begin_step(index, scan_s + self._exposer.running_s() - begun_s)
 
     def _place(self, surface: Surface) -> None:
         name = self._protocol.sample.name if surface == "sample" else "the white tile"

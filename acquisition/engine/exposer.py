@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -46,7 +46,8 @@ class Exposer:
     """Chooses exposures, and takes and keeps one dark for each; every dark is recorded.
 
     An exposure that is used for the first time is checked by light. Where the camera rounds an
-    exposure, the one that it confirmed counts.
+    exposure, the one that it confirmed counts. `on_pause` is called after an extra frame, whose
+    time is no scan time.
     """
 
     camera: RetryingCamera
@@ -55,6 +56,7 @@ class Exposer:
     protocol: Protocol
     rig: Rig
     record: Record
+    on_pause: Callable[[], None]
     _check: ExposureCheck = field(init=False)
     _start_s: float = field(default=0.0, init=False)
     _search: ExposureSearch = field(init=False)
@@ -65,14 +67,13 @@ class Exposer:
     def __post_init__(self) -> None:
         target = self.protocol.exposure_target
         self._search = ExposureSearch(self.camera, self.rig.camera, target)
-        self._check = ExposureCheck(self.rig.camera, self.clock, self.connected_s, self.record)
+        self._check = ExposureCheck(self.rig.camera, self.clock, self.running_s, self.record)
 
     def restore(self, readings: Sequence[Reading]) -> None:
         """Take over from a stopped scan: brightness of the surfaces, and exposures with a dark."""
         for reading in readings:
             self.note_brightness(reading)
         self._used_before = frozenset(reading.exposure_s for reading in readings)
-        self._check.confirmed |= self._used_before
 
     def note_brightness(self, reading: Reading) -> None:
         """Base the first exposure of the surface's next step on this reading."""
@@ -80,7 +81,7 @@ class Exposer:
 
     def start_clock(self, elapsed_s: float) -> None:
         """Start the scan time, at the duration so far."""
-        self._start_s = self.connected_s() - elapsed_s
+        self._start_s = self.running_s() - elapsed_s
 
     def expose(self, step: Step, window: Window) -> Exposed:
         """Take all frames of a step, unsaturated if the camera's exposure range allows it."""
@@ -98,15 +99,12 @@ class Exposer:
         return Exposed(step, frames, dark, time_s=time_s, free_s=self.scan_s(), time_utc=utc)
 
     def scan_s(self) -> float:
-        """Return the scan time: seconds since its start, without interruptions.
+        """Return the scan time: seconds since its start, without interruptions."""
+        return self.running_s() - self._start_s
 
-        Waiting for a lost camera and checking exposures do not count either.
-        """
-        return self.connected_s() - self._start_s - self._check.spent_s
-
-    def connected_s(self) -> float:
-        """Return the time without that spent on waiting for a lost camera."""
-        return self.clock.now_s() - self.camera.waited_s
+    def running_s(self) -> float:
+        """Return the time in seconds, without waiting for a lost camera and checking exposures."""
+        return self.clock.now_s() - self.camera.waited_s - self._check.spent_s
 
     def _comparison(self, exposure_s: float) -> list[Frame]:
         """Take a frame of a shorter exposure, if the given one is to be checked."""
@@ -115,7 +113,9 @@ class Exposer:
             return []
         with self._check.timed():
             self._search.set(shorter_s)
-            return self.camera.grab(1)
+            frames = self.camera.grab(1)
+        self.on_pause()
+        return frames
 
     def _first_guess_s(self, step: Step) -> float:
         """Return the exposure that suits the surface's last reading, or else the planned one."""
@@ -127,11 +127,11 @@ class Exposer:
     def _dark(self, exposure_s: float) -> Dark:
         """Return the dark of an exposure; the scan time excludes darks repeated by a resume."""
         if exposure_s not in self._darks:
-            begun_s = self.connected_s()
+            begun_s = self.running_s()
             asked_s = self._search.asked_s(exposure_s)
             self.take_darks((asked_s,))
             if exposure_s in self._used_before:
-                self._start_s += self.connected_s() - begun_s
+                self._start_s += self.running_s() - begun_s
         if exposure_s not in self._darks:
             now_s = self._search.taken_s[asked_s]
             raise DeviceError(

@@ -35,7 +35,8 @@ _MAX_TRIES = 3  # of one exposure, in a scene too dark to prove anything
 class ExposureCheck:
     """Exposures of a camera that light has confirmed, and the time spent on it.
 
-    `now_s`: time without waiting for a lost camera. `confirmed`: exposures in seconds. `spent_s`:
+    A resumed scan begins anew: the camera has been opened again. `now_s`: time without waiting for
+    a lost camera. `confirmed`: exposures in seconds. `spent_s`:
     time of the extra frames.
     """
 

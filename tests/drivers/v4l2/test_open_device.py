@@ -135,6 +135,30 @@ def test_a_limited_range_is_refused_unless_the_rig_file_says_so(
         remote.ask("open", replace(YUYV, pixel_format="GREY"))  # counts of the sensor
 
 
+@pytest.mark.parametrize(
+    ("name", "colours", "quantization", "limited"),
+    [
+        ("YUYV", 8, 0, True),  # sRGB, range not stated
+        ("YUYV", 1, 0, True),  # SMPTE 170M
+        ("YUYV", 7, 0, False),  # JPEG
+        ("YUYV", 8, 1, False),
+        ("YUYV", 7, 2, True),
+        ("GREY", 8, 2, False),
+        ("Y16", 8, 0, False),
+    ],
+)
+def test_the_range_of_luma_is_read_from_the_format(
+    monkeypatch: pytest.MonkeyPatch, name: str, colours: int, quantization: int, limited: bool
+) -> None:
+    def answer(descriptor: int, request: int, memory: bytearray) -> None:
+        assert (descriptor, request) == (5, ioctl.G_FMT)
+        fields = (1, 64, 48, ioctl.fourcc(name), 1, 128, 6144, colours, 0xFEEDCAFE, 0, 0)
+        memory[:] = ioctl.FORMAT_STRUCT.pack(*fields, quantization)
+
+    monkeypatch.setattr("fcntl.ioctl", answer)
+    assert ioctl.current_format(5).limited_range == limited
+
+
 def test_a_full_range_is_refused_where_the_rig_file_says_limited(
     remote: RemoteCamera, scene: LevelScene
 ) -> None:

@@ -10,7 +10,7 @@ import re
 
 import pytest
 
-MODULES = ("newport_controller", "oriental_controller", "zaber_controller")
+MODULES = ("newport_controller", "oriental_controller", "zaber_controller", "v4l2.device")
 
 
 @pytest.mark.parametrize("module", MODULES)
