@@ -27,6 +27,8 @@ from instrument.geometry import FloatArray, Geometry
 
 # Local minima of a grid from which the search starts.
 _MAX_STARTS = 10
+# Points from which on a chi2 of `enough` shows the deepest minimum without the special cases.
+_MANY = 60
 # Iterations in which a robust fit and its estimate of the noise converge.
 _ROBUST_ROUNDS = 3
 # Standard deviation of normal errors over the median of their absolute values.
@@ -76,7 +78,8 @@ class FirstFits:
         nodes = grid.minima(problem.covariance, _MAX_STARTS)
         enough = enough_chi2(m, problem)
         found = all_minima(problem, nodes, enough)
-        for x in self._special_cases(problem) if found[0].chi2 > enough else ():
+        clear = found[0].chi2 <= enough and m.size >= _MANY
+        for x in () if clear else self._special_cases(problem):
             if problem.chi2(x) < found[0].chi2 * (1 - LOWER):
                 found.insert(0, to_the_end(problem, x))
         starts = tuple(minimum.x for minimum in found)
