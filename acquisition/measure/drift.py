@@ -51,6 +51,20 @@ class _Segment:
         inside = float(np.interp(time_s, self.times_s, self.level))
         return inside + self.trend_per_s * self.outside_s(time_s)
 
+    def u_extrapolated(self, time_s: float) -> float:
+        """Return the standard uncertainty of an extrapolated level.
+
+        That of a trend which changes steadily: a parabola that is `bend` off the mean trend in the
+        middle of the checks. Two checks show no bend: then half of the extrapolation.
+        """
+        outside_s = abs(self.outside_s(time_s))
+        if self.times_s.size < 3:
+            return abs(self.trend_per_s * outside_s) / 2
+        straight = self.level[0] + self.trend_per_s * (self.times_s - self.times_s[0])
+        bend = float(np.max(np.abs(self.level - straight)))
+        share = outside_s / float(self.times_s[-1] - self.times_s[0])
+        return 4 * bend * share * (1 + share)
+
     def interpolation(self, times_s: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return for times (N,) the index of the preceding check and the next one's weight."""
         last = self.times_s.size - 1
@@ -105,9 +119,9 @@ class Drift:
         return 1.0 if segment is None else segment.at(time_s)
 
     def u_extrapolated(self, time_s: float) -> float:
-        """Return the standard uncertainty of an extrapolated level: half of the extrapolation."""
+        """Return the standard uncertainty of a level for being extrapolated; 0 between checks."""
         segment = self._segment(time_s)
-        return 0.0 if segment is None else abs(segment.trend_per_s * segment.outside_s(time_s)) / 2
+        return 0.0 if segment is None else segment.u_extrapolated(time_s)
 
     def predicted_rate(self, time_s: float) -> tuple[float, float]:
         """Return the counts per second expected of a check at that time, and their relative u."""

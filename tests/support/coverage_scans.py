@@ -106,7 +106,7 @@ def drawn_scan(
     }
     tile = WhiteTile(reflectance=0.99, u_reflectance=0.0, theta_r_deg=10.0)
     references = References(
-        white_tile=tile, drift_check=DriftCheck(theta_r_deg=10.0, every_points=20)
+        white_tile=tile, drift_check=DriftCheck(theta_r_deg=10.0, every_points=10)
     )
     loaded = changed(
         demo,

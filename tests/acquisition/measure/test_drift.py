@@ -39,8 +39,25 @@ def test_levels_are_interpolated_and_extrapolated_by_the_mean_trend() -> None:
     assert drift.at(30.0) == pytest.approx(0.97)
     # From first to last check the level falls by 0.04 in 30 s.
     assert drift.at(55.0) == pytest.approx(0.94)
-    assert drift.u_extrapolated(55.0) == pytest.approx(0.01)
     assert drift.u_extrapolated(30.0) == 0.0
+
+
+@pytest.mark.parametrize("time_s", [-10.0, 5.0, 70.0, 100.0])
+@pytest.mark.parametrize("bend", [0.0, 2e-6, -1e-5])
+def test_the_uncertainty_of_an_extrapolation_is_what_a_changing_trend_leaves(
+    bend: float, time_s: float
+) -> None:
+    def level(at_s: float) -> float:
+        return 1 - 1e-4 * (at_s - 10) + bend * (at_s - 10) ** 2
+
+    drift = Drift.of([check(n, t, 1000 * level(t)) for n, t in enumerate((10.0, 35.0, 60.0))], 0)
+    error = drift.at(time_s) - level(time_s)
+    assert drift.u_extrapolated(time_s) == pytest.approx(abs(error), abs=1e-12)
+
+
+def test_two_checks_leave_half_of_the_extrapolation_uncertain() -> None:
+    drift = Drift.of(CHECKS[:2], 0)  # the level falls by 0.02 in 10 s
+    assert drift.u_extrapolated(25.0) == pytest.approx(0.005)
 
 
 def test_a_level_is_the_weighted_mean_of_its_two_checks() -> None:
@@ -60,10 +77,11 @@ def test_levels_after_a_jump_refer_to_the_first_check_of_all() -> None:
     assert (before.tolist(), weight.tolist()) == ([0, 1], [0.0, 0.5])
 
 
-def test_a_check_is_predicted_with_its_noise_and_half_of_the_extrapolation() -> None:
+def test_a_check_is_predicted_with_its_noise_and_the_uncertainty_of_the_extrapolation() -> None:
     rate, u_relative = Drift.of(CHECKS, 0).predicted_rate(55.0)
     assert rate == pytest.approx(940.0)
-    assert u_relative == pytest.approx(math.hypot(1 / 960, 0.01))
+    # At 20 s the level is 1/150 off the mean trend; 55 s is half a duration beyond the checks.
+    assert u_relative == pytest.approx(math.hypot(1 / 960, 4 / 150 * 0.5 * 1.5))
 
 
 def test_without_usable_checks_the_level_is_1() -> None:
