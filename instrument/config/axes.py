@@ -103,7 +103,7 @@ class _WiredAxis(_MotorAxis):
     """
 
     port: Port
-    reply_s: Annotated[float, Field(ge=0.05, le=2.0)] = REPLY_S
+    reply_s: Annotated[float, Field(ge=0.05, le=1.0)] = REPLY_S
 
     @property
     def place(self) -> str:
