@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acquisition.engine.engine import Devices
 from acquisition.engine.exposure_check import ExposureCheck
 from acquisition.measure.linearity import LEAST_RATIO
 from acquisition.plan.exposure_ladder import exposure_ladder_s
@@ -18,21 +20,28 @@ from acquisition.rig import open_devices
 from instrument.config.camera import CameraDefects
 from instrument.config.load import Loaded
 from instrument.config.protocol import SimulatedSample
+from instrument.devices import Camera, Frame
 from instrument.errors import DeviceError
 from instrument.record.record import Record
 from sim.clock import SimulatedClock
-from tests.support.scans import changed, small_scan
+from tests.support.scans import changed, small_scan, undated
 from tests.support.stopped_scan import scan
 
 GREY = 0.18
 CAMERA = small_scan().rig.camera
 
 
-def grey_card(defects: dict[str, Any], rig: str = "bench_12bit", seed: int = 2026) -> Loaded:
+def grey_card(
+    defects: dict[str, Any], rig: str = "bench_12bit", seed: int = 2026, drift: float = 0.01
+) -> Loaded:
     """A scan of a grey card and a white tile by a camera with these defects."""
     small = small_scan(rig)
     simulation = small.rig.simulation.model_copy(
-        update={"camera_defects": CameraDefects.model_validate(defects), "seed": seed}
+        update={
+            "camera_defects": CameraDefects.model_validate(defects),
+            "seed": seed,
+            "lamp_drift_per_hour": drift,
+        }
     )
     sample = SimulatedSample(model="lambert", parameters={"albedo": GREY})
     return changed(small, rig={"simulation": simulation}, simulated_sample=sample)
@@ -64,6 +73,60 @@ def test_an_exposure_that_the_camera_does_not_make_stops_the_scan(
     fixed, longest = defects.get("fixed_exposure_s"), defects.get("longest_exposure_s", 10)
     assert fixed not in wrong
     assert all(exposure_s <= longest * 1.01 for exposure_s in wrong)
+
+
+@pytest.mark.parametrize("upto", [10, 13])
+def test_a_camera_that_has_changed_before_a_resume_is_found(new_record: Record, upto: int) -> None:
+    """A lamp that drifts fast shows that the check's time is no scan time."""
+    sound = grey_card({}, drift=0.9)
+    scan(sound, new_record, upto=upto)
+    before = new_record.readings()
+    shorter = [e * (0.9 if e > 0.1 else 1) for e in exposure_ladder_s(CAMERA)]
+    with pytest.raises(DeviceError, match=r"does not expose as long as it"):
+        scan(grey_card({"exposures_s": shorter}, drift=0.9), new_record)
+    assert new_record.readings() == before
+    scan(sound, new_record)
+    with Record.create(new_record.folder / "whole", {}) as whole:
+        scan(sound, whole)
+        assert undated(new_record.readings()) == undated(whole.readings())
+
+
+class StampedCamera:
+    """Forwards to a camera whose light is right, and stamps its frames every 33 ms.
+
+    `series`: whether those of a series of this length have stamps.
+    """
+
+    def __init__(self, camera: Camera, series: Callable[[int], bool]) -> None:
+        self._camera, self._series, self._number = camera, series, 0
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._camera, name)
+
+    def grab(self, count: int) -> list[Frame]:
+        frames = self._camera.grab(count)
+        first, self._number = self._number, self._number + count
+        if not self._series(count):
+            return frames
+        return [replace(f, device_time_s=0.033 * (first + n)) for n, f in enumerate(frames)]
+
+
+DARK_FRAMES = small_scan().protocol.dark_frames
+
+
+@pytest.mark.parametrize(
+    "series", [lambda count: count < DARK_FRAMES, lambda count: count == DARK_FRAMES],
+    ids=["of the sample", "darks"],
+)  # fmt: skip
+def test_frames_that_follow_one_another_too_fast_stop_the_scan(
+    new_record: Record, series: Callable[[int], bool]
+) -> None:
+    def stamped(devices: Devices) -> Devices:
+        return replace(devices, camera=StampedCamera(devices.camera, series))  # type: ignore[arg-type]  # forwards
+
+    with pytest.raises(DeviceError, match=r"its frames come every 0.033 s, .* max_exposure_s"):
+        scan(grey_card({}), new_record, changed_devices=stamped)
+    assert all(r.exposure_s < 0.04 for r in new_record.readings())
 
 
 @pytest.mark.parametrize(
