@@ -55,15 +55,17 @@ class _Segment:
         """Return the standard uncertainty of an extrapolated level.
 
         That of a trend which changes steadily: a parabola that is `bend` off the mean trend in the
-        middle of the checks. Two checks show no bend: then half of the extrapolation.
+        middle of the checks, by more than twice their noise; and the noise of the mean trend. Two
+        checks show no bend: then half of the extrapolation.
         """
         outside_s = abs(self.outside_s(time_s))
         if self.times_s.size < 3:
             return abs(self.trend_per_s * outside_s) / 2
         straight = self.level[0] + self.trend_per_s * (self.times_s - self.times_s[0])
-        bend = float(np.max(np.abs(self.level - straight)))
+        noise = float(np.max(self.u_relative))
+        bend = max(float(np.max(np.abs(self.level - straight))) - 2 * noise, 0.0)
         share = outside_s / float(self.times_s[-1] - self.times_s[0])
-        return 4 * bend * share * (1 + share)
+        return math.hypot(4 * bend * share * (1 + share), math.sqrt(2) * noise * share)
 
     def interpolation(self, times_s: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return for times (N,) the index of the preceding check and the next one's weight."""

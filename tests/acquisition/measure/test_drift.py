@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,8 @@ def test_the_uncertainty_of_an_extrapolation_is_what_a_changing_trend_leaves(
     def level(at_s: float) -> float:
         return 1 - 1e-4 * (at_s - 10) + bend * (at_s - 10) ** 2
 
-    drift = Drift.of([check(n, t, 1000 * level(t)) for n, t in enumerate((10.0, 35.0, 60.0))], 0)
+    made = [check(n, t, 1000 * level(t)) for n, t in enumerate((10.0, 35.0, 60.0))]
+    drift = Drift.of([replace(c, u_noise_dn=0.0) for c in made], 0)
     error = drift.at(time_s) - level(time_s)
     assert drift.u_extrapolated(time_s) == pytest.approx(abs(error), abs=1e-12)
 
@@ -81,7 +83,20 @@ def test_a_check_is_predicted_with_its_noise_and_the_uncertainty_of_the_extrapol
     rate, u_relative = Drift.of(CHECKS, 0).predicted_rate(55.0)
     assert rate == pytest.approx(940.0)
     # At 20 s the level is 1/150 off the mean trend; 55 s is half a duration beyond the checks.
-    assert u_relative == pytest.approx(math.hypot(1 / 960, 4 / 150 * 0.5 * 1.5))
+    bend, noise = 4 * (1 / 150 - 2 / 960) * 0.5 * 1.5, math.sqrt(2) / 960 * 0.5
+    assert u_relative == pytest.approx(math.hypot(1 / 960, bend, noise))
+
+
+def test_noise_of_the_checks_is_no_bend_of_the_drift() -> None:
+    """A steady lamp seen with its noise: the extrapolation has the noise of the trend."""
+    random = np.random.default_rng(1)
+    pulls = []
+    for _ in range(300):
+        levels = 1000 + random.standard_normal(5)
+        drift = Drift.of([check(n, 10.0 * n, level) for n, level in enumerate(levels)], 0)
+        changed = drift.at(70.0) - drift.level[-1]  # by a trend that is noise alone
+        pulls.append(changed / drift.u_extrapolated(70.0))
+    assert 0.6 < np.sqrt(np.mean(np.square(pulls))) < 1.2
 
 
 def test_without_usable_checks_the_level_is_1() -> None:
