@@ -90,7 +90,7 @@ def show_plan(protocol_path: Path, rig_path: Path | None, as_json: bool) -> None
 
 
 def _plan_json(loaded: Loaded, plan: Plan) -> dict[str, object]:
-    determinable = Determinable.of(loaded.protocol)
+    determinable = Determinable.of(loaded.protocol, [step.pose for step in plan.points])
     return {
         "points": len(plan.points),
         "hidden": [pose._asdict() for pose in plan.hidden],

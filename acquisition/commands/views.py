@@ -69,12 +69,13 @@ def _plan_rows(loaded: Loaded, plan: Plan) -> Iterator[tuple[str, str]]:
         + (f": (theta_i, dphi, theta_r) = {hidden}{more}" if hidden else ""),
     )
     yield "references", f"{tiles} white tile, {drifts} drift checks"
-    determinable = Determinable.of(loaded.protocol)
+    determinable = Determinable.of(loaded.protocol, [step.pose for step in plan.points])
     if determinable.no:
+        can = f"it can determine {', '.join(determinable.yes)}"
         yield (
             "no white tile",
             f"radiance is relative: the fit will not determine {', '.join(determinable.no)}; "
-            f"it can determine {', '.join(determinable.yes)}",
+            + (can if determinable.yes else "it needs two or more views at each lamp setting"),
         )
     yield (
         "operator",

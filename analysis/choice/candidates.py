@@ -43,9 +43,9 @@ class Candidates:
         """
         found = cls(FirstFits(measurements), robust, every).with_more(names)
         if not found.first:
-            raise NotDetermined(
-                f"{measurements.size} points are too few to fit any of: {', '.join(names)}"
-            )
+            n = measurements.size
+            few = "1 point is" if n == 1 else f"{n} points are"
+            raise NotDetermined(f"{few} too few to fit any of: {', '.join(names)}")
         return found
 
     @property

@@ -23,7 +23,7 @@ from instrument.geometry import FloatArray, Geometry
 DIFFUSE = Parameter("diffuse", "1", 0.0, 1.0, 0.5, scale=True)
 LOBE = Parameter("lobe", "1/sr", 0.0, 10.0, 0.1, scale=True)
 SPIKE = Parameter("spike", "1", 0.0, 10.0, 0.1, scale=True)
-SPIKE_WIDTH_DEG = Parameter("spike_width_deg", "degrees", 0.05, 10.0, 1.0)
+SPIKE_WIDTH_DEG = Parameter("spike_width_deg", "degrees", 0.05, 10.0, 1.0, scanned=True)
 
 
 def unified_brdf(

@@ -109,7 +109,7 @@ def test_too_few_points_for_any_fit_end_with_5_and_their_json(tmp_path: Path) ->
     done = gonio("fit", path, "--models", "oren_nayar", "--json")
     assert done.returncode == 5
     assert json.loads(done.stdout)["chosen"] is None
-    assert "1 points are too few" in done.stderr
+    assert "1 point is too few" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ CASES = {
         },
         5,
         "not identifiable",
-        "1 points are too few",
+        "1 point is too few",
         "oren_nayar",
     ),
     "black sample": Case(
