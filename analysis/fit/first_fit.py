@@ -19,16 +19,14 @@ from analysis.fit.relative_scale import FACTOR_NAME, relative_model
 from analysis.fit.search.levenberg_marquardt import HUBER, Minimum
 from analysis.fit.search.minima import LOWER, all_minima, to_the_end
 from analysis.fit.search.problem import Problem
-from analysis.fit.search.starting_values import Grid, Known
+from analysis.fit.search.starting_values import MANY, Grid, Known
 from analysis.models import MODELS, Model
 from analysis.models.special_cases import special_cases
 from instrument.errors import NotDetermined
 from instrument.geometry import FloatArray, Geometry
 
-# Local minima of a grid from which the search starts.
-_MAX_STARTS = 10
-# Points from which on a chi2 of `enough` shows the deepest minimum without the special cases.
-_MANY = 60
+# Local minima of a grid from which the search starts, and of one for MANY points.
+_MAX_STARTS, _STARTS_OF_MANY = 10, 5
 # Iterations in which a robust fit and its estimate of the noise converge.
 _ROBUST_ROUNDS = 3
 # Standard deviation of normal errors over the median of their absolute values.
@@ -75,10 +73,11 @@ class FirstFits:
     def _fit(self, model: Model) -> FirstFit:
         m, grid = self.measurements, self._grid(model)
         problem = grid.problem
-        nodes = grid.minima(problem.covariance, _MAX_STARTS)
+        count = _MAX_STARTS if m.size < MANY else _STARTS_OF_MANY
+        nodes = grid.minima(problem.covariance, count)
         enough = enough_chi2(m, problem)
         found = all_minima(problem, nodes, enough)
-        clear = found[0].chi2 <= enough and m.size >= _MANY
+        clear = found[0].chi2 <= enough and m.size >= MANY
         for x in () if clear else self._special_cases(problem):
             if problem.chi2(x) < found[0].chi2 * (1 - LOWER):
                 found.insert(0, to_the_end(problem, x))

@@ -12,6 +12,7 @@ the bounds; P. J. Huber, Annals of Mathematical Statistics 35 (1964), for the ro
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -71,7 +72,7 @@ class _Quadratic(NamedTuple):
     def stationary(self, chi2: float, tolerance: float) -> bool:
         """True where no free parameter has a gradient beyond `tolerance`, as a cosine."""
         free = ~self.fixed()
-        scale = np.sqrt(np.diag(self.curvature)[free] * chi2)
+        scale = np.sqrt(np.diag(self.curvature)[free]) * math.sqrt(chi2)
         return bool(np.all(np.abs(self.gradient[free]) <= tolerance * scale))
 
     def stationary_to_rounding(self, chi2: float) -> bool:

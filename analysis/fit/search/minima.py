@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.fit.search.levenberg_marquardt import Minimum
 from analysis.fit.search.problem import Problem
-from analysis.fit.search.starting_values import values_between
+from analysis.fit.search.starting_values import MANY, values_between
 from instrument.geometry import FloatArray
 
 # Relative tolerance of chi2, and the most steps, of the search from every start. A minimum that is
@@ -26,7 +26,7 @@ _CRAWLING = 0.1
 # to explain the data better.
 _AGREEING, _ALIKE = 2, 2e-3
 # Relative tolerance with which the level alone is adjusted.
-_LEVEL_RTOL = 1e-2
+_LEVEL_RTOL = 0.1
 # Steps between the `starts` of a parameter that is scanned, and the relative tolerance there.
 _SCAN_STEPS, _SCAN_RTOL = 4, 0.1
 # Further searches along a valley that one search does not reach the end of; distance of minima that
@@ -54,8 +54,9 @@ def all_minima(
     where several starts have led to the same minimum with a chi2 of `enough`.
     """
     found = _rough_minima(problem, starts, enough)
-    beside = [_rough_minimum(problem, start) for start in _starts_beside(problem, found[0].x)]
-    found = sorted([*found, *beside], key=_depth)
+    if problem.brdf.size < MANY:
+        beside = [_rough_minimum(problem, start) for start in _starts_beside(problem, found[0].x)]
+        found = sorted([*found, *beside], key=_depth)
     done = [to_the_end(problem, found[0].x)]
     for one in found[1:]:
         above = (_CLOSE if one.converged else _UNFINISHED) * found[0].chi2 + enough

@@ -25,6 +25,10 @@ _OFF_ZERO = 1e-3
 # Steps of the grid from one of a parameter's `starts` to the next, where a term has one such
 # parameter, and where it has more: a narrow lobe fits few points in a narrow range of widths.
 _STEPS_ONE, _STEPS_MORE = 4, 2
+# Starts of a parameter from which on there are no values between them.
+_ENOUGH_STARTS = 10
+# Points from which on chi2 has hardly more minima than a coarser grid shows.
+MANY = 90
 # Nodes of the whole grid beyond which there are no values between the `starts`.
 _MOST_NODES = 8000
 
@@ -57,8 +61,9 @@ class _Layout:
 
 
 @lru_cache(maxsize=128)
-def _layout(parameters: Parameters, terms: tuple[Parameters, ...]) -> _Layout:
-    values = _searched_values(parameters, terms)
+def _layout(parameters: Parameters, terms: tuple[Parameters, ...], many: bool) -> _Layout:
+    """Layout for a model with these parameters; with many points some axes have fewer values."""
+    values = _searched_values(parameters, terms, many)
     solved = [i for i, p in enumerate(parameters) if p.scale or p.level]
     nodes = list(itertools.product(*values))
     at = dict(zip((p.name for p in parameters), np.reshape(nodes, (len(nodes), -1)).T, strict=True))
@@ -93,7 +98,8 @@ class Grid:
     def of(cls, problem: Problem, known: Known | None = None) -> Grid:
         """Evaluate the model of a problem on its grid; `known` parts are taken, and added to."""
         terms = problem.model.terms or (problem.model,)
-        layout = _layout(problem.model.parameters, tuple(term.parameters for term in terms))
+        many = problem.brdf.size >= MANY
+        layout = _layout(problem.model.parameters, tuple(t.parameters for t in terms), many)
         known = {} if known is None else known
         columns = [np.zeros(problem.brdf.size)]
         for term, nodes in zip(terms, layout.own, strict=True):
@@ -181,23 +187,23 @@ def starting_values(problem: Problem, count: int) -> list[FloatArray]:
 
 
 def _searched_values(
-    parameters: Parameters, terms: tuple[Parameters, ...]
+    parameters: Parameters, terms: tuple[Parameters, ...], many: bool
 ) -> list[tuple[float, ...]]:
     """Values on the grid of each parameter; of a scale its default alone."""
-    fine = [values_between(p, _steps(p, terms)) for p in parameters]
+    fine = [values_between(p, _steps(p, terms, many)) for p in parameters]
     if np.prod([len(values) for values in fine]) <= _MOST_NODES:
         return fine
     return [values_between(p, 1) for p in parameters]
 
 
-def _steps(parameter: Parameter, terms: tuple[Parameters, ...]) -> int:
+def _steps(parameter: Parameter, terms: tuple[Parameters, ...], many: bool) -> int:
     """Steps between two `starts`: fewer where a term has several parameters to search for."""
-    most = 1
-    for term in terms:
-        shapes = [p.name for p in term if not p.scale and len(p.starts) > 1]
-        if parameter.name in shapes:
-            most = max(most, len(shapes))
-    return 1 if parameter.level else _STEPS_ONE if most == 1 else _STEPS_MORE
+    if parameter.level or len(parameter.starts) > _ENOUGH_STARTS:
+        return 1
+    shapes = [[p.name for p in term if not p.scale and len(p.starts) > 1] for term in terms]
+    if max((len(names) for names in shapes if parameter.name in names), default=1) == 1:
+        return _STEPS_ONE
+    return 1 if many and parameter.logarithmic else _STEPS_MORE
 
 
 def values_between(parameter: Parameter, steps: int) -> tuple[float, ...]:

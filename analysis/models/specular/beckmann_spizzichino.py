@@ -31,7 +31,7 @@ from analysis.models.validity import either_grazes, valid_except
 from instrument.geometry import FloatArray, Geometry
 
 SCALE = Parameter("scale", "1", 0.0, 10.0, 0.1, scale=True)
-# Both lengths matter by their ratio to the wavelength: a fit tries decades.
+# Both lengths matter by their ratio to the wavelength: a fit tries decades, and between them.
 SIGMA_H = Parameter(
     "sigma_h",
     "wavelengths",
@@ -43,7 +43,8 @@ SIGMA_H = Parameter(
 )
 CORRELATION_LENGTH = Parameter(
     "correlation_length", "wavelengths", 0.1, 1000.0, 10.0,
-    starts=(0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 400.0), logarithmic=True,
+    starts=(0.3, 0.55, 1.0, 1.7, 3.0, 5.5, 10.0, 17.0, 30.0, 55.0, 100.0, 200.0, 400.0),
+    logarithmic=True,
 )  # fmt: skip
 
 K = 2 * math.pi  # the propagation constant (64), in 1/wavelength
