@@ -135,7 +135,8 @@ def _exposure_note(reduced: Reduced, record: Record) -> str:
 
 def _hidden_note(record: Record) -> str:
     hidden = int(record.meta("hidden") or 0)
-    return f"{hidden} geometries left out: camera and lamp hide one another" if hidden else ""
+    geometries = "1 geometry" if hidden == 1 else f"{hidden} geometries"
+    return f"{geometries} left out: camera and lamp hide one another" if hidden else ""
 
 
 def _flag_note(reduced: Reduced) -> str:
