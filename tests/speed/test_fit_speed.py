@@ -65,7 +65,8 @@ def test_the_ladder_and_an_exact_candidate_cost_a_few_lmfit_fits(scan: Measureme
     choice = choose(scan, method="functional")
     assert choice.chosen == "oren_nayar"
     ruler = cpu_seconds(lambda: by_lmfit(scan), 5)
-    assert cpu_seconds(lambda: choose(scan, method="functional"), 3) < 100 * ruler
+    # About 100: 14 candidates, each searched from all its minima. A guard, with room.
+    assert cpu_seconds(lambda: choose(scan, method="functional"), 3) < 150 * ruler
     exact: list[FitResult] = []
 
     def fit_exact() -> None:

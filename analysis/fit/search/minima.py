@@ -23,7 +23,7 @@ _CLOSE, _UNFINISHED = 0.1, 1.0
 # A search from a further start ends with a step that lowers chi2 by this fraction of the best.
 _CRAWLING = 0.1
 # Starts that lead to the same chi2, but for this fraction of it, after which no other is expected
-# to explain many points better.
+# to explain the data better.
 _AGREEING, _ALIKE = 2, 2e-3
 # Relative tolerance with which the level alone is adjusted.
 _LEVEL_RTOL = 0.1
@@ -51,7 +51,7 @@ def all_minima(
     """Minima of a problem from all starts, the deepest first; it and any as deep to the end.
 
     Starts are parameters (K,) in the model's units, `enough` is in units of u^2. The search ends
-    where several starts have led to the same minimum, of MANY points, with a chi2 of `enough`.
+    where several starts have led to the same minimum with a chi2 of `enough`.
     """
     found = _rough_minima(problem, starts, enough)
     if problem.brdf.size < MANY:
@@ -70,12 +70,11 @@ def all_minima(
 
 def _rough_minima(problem: Problem, starts: Sequence[FloatArray], enough: float) -> list[Minimum]:
     found: list[Minimum] = []
-    needed = _AGREEING if problem.brdf.size >= MANY else len(starts)
     for start in starts:
         crawling = _CRAWLING * found[0].chi2 if found else 0.0
         found = sorted([*found, _rough_minimum(problem, start, crawling)], key=_depth)
         agreeing = sum(one.chi2 <= found[0].chi2 * (1 + _ALIKE) for one in found)
-        if found[0].chi2 <= enough and agreeing >= needed:
+        if found[0].chi2 <= enough and agreeing >= _AGREEING:
             break
     return found
 
