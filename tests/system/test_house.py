@@ -88,7 +88,7 @@ def test_no_module_has_more_than_400_lines() -> None:
     assert not {name: lines for name, lines in long.items() if lines > 400}
 
 
-def test_the_folders_at_the_top_are_the_seven_and_docs() -> None:
+def test_the_top_has_the_seven_folders_docs_and_few_files() -> None:
     done = subprocess.run(
         ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -96,6 +96,8 @@ def test_the_folders_at_the_top_are_the_seven_and_docs() -> None:
         pytest.skip("no git checkout: which files belong to the project is not known")
     tops = {Path(name).parts[0] for name in done.stdout.splitlines() if "/" in name}
     assert tops - {".ci"} <= {*PACKAGES, "configs", "tests", "docs"}
+    files = {name for name in done.stdout.splitlines() if "/" not in name}
+    assert files <= {".gitignore", "LICENSE", "Makefile", "README.md", "pyproject.toml"}
 
 
 def test_a_room_without_a_place_fails_the_import_contracts(tmp_path: Path) -> None:
