@@ -145,7 +145,6 @@ def test_answers_that_are_lost_in_a_pause_are_no_fault_of_the_line(setup: Setup)
     assert setup.moves_on()
 
 
-@pytest.mark.skip(reason="no pause was named in one of two whole runs: to be understood first")
 @pytest.mark.parametrize("setup", ["oriental rtu"], indirect=True)
 def test_a_pause_is_named_also_if_the_watchdogs_thread_wakes_last(
     setup: Setup, monkeypatch: pytest.MonkeyPatch
