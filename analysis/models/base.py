@@ -15,10 +15,10 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from instrument.geometry import BoolArray, FloatArray, Geometry
+from instrument.geometry import BoolArray, FloatArray, Geometry, IntArray
 
 Kernel = Callable[..., FloatArray]
-T = TypeVar("T", bound=FloatArray | tuple[FloatArray, ...])
+T = TypeVar("T", bound=FloatArray | tuple[FloatArray | IntArray, ...])
 
 Ranges = Mapping[str, tuple[float, float]]
 """Lowest and highest value of each parameter; a known one has them equal."""

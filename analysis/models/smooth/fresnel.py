@@ -92,42 +92,29 @@ def transmittance(theta: ArrayLike, n: ArrayLike) -> FloatArray:
     return result
 
 
-def transmittance_gradient(theta: ArrayLike, n: ArrayLike) -> FloatArray:
-    """Derivative of `transmittance` by n, arguments and shape as there (radians).
+def transmittance_with_gradients(
+    theta: ArrayLike, n: ArrayLike
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """`transmittance` and its derivatives by n and by cos(theta).
 
-    It grows without limit at grazing for n = 1.
+    Arguments (radians) and shapes as there.
 
-    With dq/dn = n/q: d(F_perp)/dn = -2 n c / (q (c + q)^2) and
-    d(F_para)/dn = 2 n c (2 q^2 - n^2) / (q (n^2 c + q)^2).
-    """
-    c, n, q = _cosines(theta, n)
-    d_perp = -2 * n * c / (q * np.square(c + q))
-    d_para = 2 * n * c * (2 * q * q - n * n) / (q * np.square(n * n * c + q))
-    return _chained(c, n, q, d_perp, d_para)
+    That by n grows without limit at grazing for n = 1. 1 - F is 1 - (F_perp^2 + F_para^2)/2, with
 
+        d(F_perp)/dn = -2 n c / (q (c + q)^2),   d(F_para)/dn = 2 n c (2 q^2 - n^2) / (q P)
+        d(F_perp)/dc = 2 (n^2 - 1) / (q (c + q)^2),   d(F_para)/dc = 2 n^2 (n^2 - 1) / (q P)
 
-def transmittance_gradient_by_cosine(theta: ArrayLike, n: ArrayLike) -> FloatArray:
-    """Derivative of `transmittance` by cos(theta), arguments and shape as there (radians).
-
-    With dq/dc = c/q: d(F_perp)/dc = 2 (n^2 - 1) / (q (c + q)^2) and
-    d(F_para)/dc = 2 n^2 (n^2 - 1) / (q (n^2 c + q)^2).
+    for c = cos(theta), q = sqrt(n^2 - sin^2 theta) and P = (n^2 c + q)^2, from dq/dn = n/q and
+    dq/dc = c/q.
     """
     c, n, q = _cosines(theta, n)
     n2, n2_1 = n * n, (n - 1) * (n + 1)
-    d_perp = 2 * n2_1 / (q * np.square(c + q))
-    d_para = 2 * n2 * n2_1 / (q * np.square(n2 * c + q))
-    return _chained(c, n, q, d_perp, d_para)
-
-
-def _chained(
-    c: FloatArray, n: FloatArray, q: FloatArray, d_perp: FloatArray, d_para: FloatArray
-) -> FloatArray:
-    """-(F_perp d(F_perp) + F_para d(F_para)): the derivative of 1 - (F_perp^2 + F_para^2)/2."""
-    n2_1 = (n - 1) * (n + 1)
-    perp = -n2_1 / np.square(c + q)
-    para = n2_1 * ((n * n + 1) * c * c - 1) / np.square(n * n * c + q)
-    result: FloatArray = -(perp * d_perp + para * d_para)
-    return result
+    p, P = np.square(c + q), np.square(n2 * c + q)
+    perp, para = -n2_1 / (p * p), n2_1 * ((n2 + 1) * c * c - 1) / (P * P)
+    transmitted: FloatArray = 2 * c * q * (1 / p + n2 / P)
+    by_n: FloatArray = 2 * n * c / q * (perp - para * (2 * q * q - n2))
+    by_cosine: FloatArray = -2 * n2_1 / q * (perp + n2 * para)
+    return transmitted, by_n, by_cosine
 
 
 def wolff_polynomial(theta: ArrayLike, epsilon: float = 0.07) -> FloatArray:

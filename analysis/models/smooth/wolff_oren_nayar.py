@@ -20,7 +20,8 @@ from analysis.models.rough.oren_nayar_forms import (
     roughness_terms,
     sigma_terms_gradient,
 )
-from analysis.models.smooth.wolff import N, both_transmittances, both_transmittances_gradient
+from analysis.models.smooth.interface import both_transmittances, both_with_gradient
+from analysis.models.smooth.wolff import N
 from analysis.models.validity import GRAZING, NEGATIVE, both_graze, valid_except
 from instrument.geometry import FloatArray, Geometry
 
@@ -53,12 +54,13 @@ def wolff_oren_nayar_gradient(
 ) -> dict[str, FloatArray]:
     """Derivatives of `wolff_oren_nayar_brdf` by albedo, sigma and n. As in `Model.gradient`."""
     sigma2 = math.radians(sigma_deg) ** 2
-    T, dT = both_transmittances(geometry, n), both_transmittances_gradient(geometry, n)
-    dC1, d_rough = sigma_terms_gradient(sigma_deg)
+    T, dT = both_with_gradient(geometry, n)
+    (dC1, d_rough), terms = sigma_terms_gradient(sigma_deg), roughness_terms(geometry)
+    C1, rough = 1 - 0.5 * sigma2 / (sigma2 + 0.33), sigma2 / (sigma2 + 0.09)
     return {
-        "albedo": wolff_oren_nayar_brdf(geometry, 1.0, sigma_deg, n),
-        "sigma_deg": (albedo / np.pi) * (dC1 * T + d_rough * roughness_terms(geometry)),
-        "n": (albedo / np.pi) * (1 - 0.5 * sigma2 / (sigma2 + 0.33)) * dT,
+        "albedo": (C1 * T + rough * terms) / np.pi,
+        "sigma_deg": (albedo / np.pi) * (dC1 * T + d_rough * terms),
+        "n": (albedo / np.pi) * C1 * dT,
     }
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from analysis.models.smooth.chandrasekhar import (
+    HFunction,
     characteristic_roots,
     h_exact,
     h_order,
-    log_h_gradient,
 )
 from tests.support.models.derivatives import central_difference
 
@@ -106,7 +106,7 @@ def test_the_derivative_of_ln_h_by_the_albedo() -> None:
     mu = np.array([0.001, 0.3, 1.0])
     for rho in (0.1, 0.9, 0.999):
         expected = central_difference(lambda r: np.log(h_exact(mu, r)), rho, 1e-4 * (1 - rho))
-        np.testing.assert_allclose(log_h_gradient(mu, rho), expected, rtol=1e-6)
+        np.testing.assert_allclose(HFunction.at(mu).log_gradient(rho), expected, rtol=1e-6)
 
 
 def test_wrong_cosines_and_albedos_are_named() -> None:

@@ -15,7 +15,8 @@ from analysis.models.smooth.chandrasekhar import (
     h_exact,
 )
 from analysis.models.smooth.fresnel import unpolarised, wolff_polynomial
-from analysis.models.smooth.wolff import internal_return, wolff_brdf
+from analysis.models.smooth.internal_return import internal_return
+from analysis.models.smooth.wolff import wolff_brdf
 from instrument.geometry import FloatArray, Geometry
 from tests.support.models.derivatives import central_difference
 from tests.support.models.geometries import (
