@@ -1,7 +1,9 @@
 """Emulated V4L2 camera: capabilities, formats, controls and faults.
 
 `EmulatedCamera` is the state that all open file descriptors share. The buffers and the stream of
-one descriptor are in `sim.emulated.v4l2.stream`; `sim.emulated.v4l2.server` receives requests.
+one descriptor are in `sim.emulated.v4l2.stream`, the exposures in `sim.emulated.v4l2.sensor`;
+`sim.emulated.v4l2.server` receives requests. `sim.emulated.usb.uvc_camera` is the same camera as a
+USB device.
 
 Transcripts: a UVC camera under uvcvideo as v4l2-ctl shows it in public reports, with the
 capabilities 0x84a00001 of the device, 0x04200001 of its node for pictures and 0x04a00000 of that
@@ -32,6 +34,7 @@ PixelFormat = Literal["GREY", "Y10", "Y16", "YUYV"]
 BYTES_PER_PIXEL: Mapping[PixelFormat, int] = {"GREY": 1, "Y10": 2, "Y16": 2, "YUYV": 2}
 BadFrame = Literal["flagged", "short"]
 _NEUTRAL_CHROMA = 128  # U and V of grey
+BRIGHTNESS = 0x980900  # V4L2_CID_BRIGHTNESS; changes no counts here
 _MANUAL = 1
 STEP_S = 1e-4  # V4L2_CID_EXPOSURE_ABSOLUTE counts 100 µs
 
@@ -57,7 +60,8 @@ Snapshot = Callable[[], object]
 class Capabilities:
     """Properties of an emulated camera.
 
-    frames_per_s: upper limit of the frame rate. overhead_s: read-out time, from the end of an
+    frames_per_s: upper limit of the frame rate. exposure_range: least, greatest and step of the
+    exposure control, in 100 µs. overhead_s: read-out time, from the end of an
     exposure to the frame's time stamp. delay_frames: number of frames after which a new exposure
     time takes effect. reports_filled: False for a driver that shows filled buffers as empty until
     they are dequeued. quantization: range of YUYV, as the number in G_FMT; `defects.limited_range`
@@ -69,6 +73,7 @@ class Capabilities:
     formats: tuple[PixelFormat, ...] = ("GREY", "Y10", "Y16", "YUYV")
     sizes: tuple[tuple[int, int], ...] = ((640, 480), (512, 480), (64, 48))
     frames_per_s: int = 30
+    exposure_range: tuple[int, int, int] = (1, 100_000, 1)
     overhead_s: float = 0.002
     delay_frames: int = 0
     row_padding_bytes: int = 0
@@ -109,15 +114,24 @@ class Refused(Exception):
         self.number = number
 
 
-def _standard_controls() -> list[ioctl.Control]:
+def _standard_controls(exposure_range: tuple[int, int, int]) -> list[ioctl.Control]:
+    least, greatest, step = exposure_range
+    default = least + (min(max(157, least), greatest) - least) // step * step
     return [
+        ioctl.Control(BRIGHTNESS, "Brightness", "integer", 0, 255, 1, 128),
         ioctl.Control(ioctl.AUTO_WHITE_BALANCE, "White Balance, Automatic", "on/off", 0, 1, 1, 1),
         ioctl.Control(ioctl.GAMMA, "Gamma", "integer", 72, 500, 1, 220),
         ioctl.Control(ioctl.AUTOGAIN, "Gain, Automatic", "on/off", 0, 1, 1, 1),
         ioctl.Control(ioctl.GAIN, "Gain", "integer", 0, 480, 10, 100),
         ioctl.Control(ioctl.EXPOSURE_AUTO, "Auto Exposure", "menu", 0, 3, 1, 3),
         ioctl.Control(
-            ioctl.EXPOSURE_ABSOLUTE, "Exposure Time, Absolute", "integer", 1, 100_000, 1, 157
+            ioctl.EXPOSURE_ABSOLUTE,
+            "Exposure Time, Absolute",
+            "integer",
+            least,
+            greatest,
+            step,
+            default,
         ),
     ]
 
@@ -148,14 +162,16 @@ class EmulatedCamera:
         self.streamer: object = None
         self.times_unplugged = 0
         missing = self.capabilities.without_controls
-        self._controls = {c.number: c for c in _standard_controls() if c.number not in missing}
-        self._restart()
+        controls = _standard_controls(self.capabilities.exposure_range)
+        self._controls = {c.number: c for c in controls if c.number not in missing}
+        self.restart()
 
-    def _restart(self) -> None:
+    def restart(self) -> None:
         """Reset format and controls to their defaults, as at power-on."""
         self._values = {number: c.default for number, c in self._controls.items()}
         self.pixel_format: PixelFormat = self.capabilities.formats[0]
         self.size = self.capabilities.sizes[0]
+        self.frame_interval_s = 1 / self.capabilities.frames_per_s
 
     # Faults
 
@@ -170,7 +186,7 @@ class EmulatedCamera:
 
     def replug(self) -> None:
         """Connect the camera again, with default settings."""
-        self._restart()
+        self.restart()
         self.faults.unplugged = False
 
     def watch_unplug(self, wake: Callable[[], None], enabled: bool) -> None:

@@ -1,4 +1,4 @@
-"""Video stream of one open descriptor: its buffers and a free-running sensor."""
+"""Video stream of one open descriptor: its buffers, which a free-running sensor fills."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import errno
 import mmap
 import os
 import threading
-import time
 from collections import deque
 from dataclasses import dataclass
 
 from drivers.v4l2 import ioctl
 from sim.emulated.v4l2.device import EmulatedCamera, Exposure, Refused
+from sim.emulated.v4l2.sensor import FreeRunningSensor
 
 _MAX_BUFFERS = 32
 _MONOTONIC = 0x2000  # V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC, taken at the end of the frame
@@ -47,8 +47,8 @@ class Stream:
         self._queued: deque[int] = deque()
         self._done: deque[int] = deque()
         self._length = 0
-        self._sensor: threading.Thread | None = None
-        self._change = threading.Condition()
+        self._sensor = FreeRunningSensor(camera, self._read_out)
+        self._lock = threading.Lock()
         self._closed = False
         camera.watch_unplug(self._wake, True)
 
@@ -59,21 +59,20 @@ class Stream:
         if self._camera.streamer is self:
             self._camera.streamer = None
         self._map = None
-        with self._change:
+        with self._lock:
             self._closed = True
             os.close(self.ready)
             os.close(self.memory)
 
     def _wake(self) -> None:
-        with self._change:
+        with self._lock:
             if not self._closed:
                 os.eventfd_write(self.ready, 1)
-            self._change.notify_all()
 
     @property
     def streaming(self) -> bool:
         """True while the sensor runs."""
-        return self._sensor is not None
+        return self._sensor.running
 
     # Requests of the application
 
@@ -96,14 +95,14 @@ class Stream:
 
     def query(self, index: int) -> bytes:
         """Return the state of a buffer as bytes of `struct v4l2_buffer`."""
-        with self._change:
+        with self._lock:
             buffer = self._buffer(index)
             visible = self._camera.capabilities.reports_filled
             return self._pack(index, buffer if visible else _Buffer())
 
     def queue(self, index: int) -> bytes:
         """Take an empty buffer back from the application; return its state."""
-        with self._change:
+        with self._lock:
             if self._buffer(index).state:
                 raise Refused(errno.EINVAL)
             buffer = self._buffers[index] = _Buffer(state=ioctl.BUFFER_QUEUED)
@@ -112,7 +111,7 @@ class Stream:
 
     def dequeue(self) -> bytes:
         """Render the oldest filled buffer, hand it to the application and return its state."""
-        with self._change:
+        with self._lock:
             if not self.streaming:
                 raise Refused(errno.EINVAL)
             if not self._done:
@@ -135,18 +134,12 @@ class Stream:
         """Start the sensor."""
         if not self._buffers:
             raise Refused(errno.EINVAL)
-        if not self.streaming:
-            self._sensor = threading.Thread(target=self._run, daemon=True, name="emulated sensor")
-            self._sensor.start()
+        self._sensor.start()
 
     def stop(self) -> None:
         """Stop the sensor and return all buffers to the application."""
-        sensor, self._sensor = self._sensor, None
-        with self._change:
-            self._change.notify_all()
-        if sensor is not None:
-            sensor.join()
-        with self._change:
+        self._sensor.stop()
+        with self._lock:
             self._queued.clear()
             self._buffers = [_Buffer() for _ in self._buffers]
             while self._done:
@@ -171,35 +164,10 @@ class Stream:
 
     # The sensor
 
-    def _run(self) -> None:
-        camera, capabilities = self._camera, self._camera.capabilities
-        pipeline = deque([camera.exposure_s] * capabilities.delay_frames)
-        due_s = time.monotonic()
-        sequence = 0
-        while self._wait_until(due_s):
-            pipeline.append(camera.exposure_s)
-            exposure = self._begin_exposure(pipeline.popleft(), sequence)
-            snapshot = camera.snapshot()
-            occupied_s = exposure.exposure_s + capabilities.overhead_s
-            end_s = max(due_s, exposure.start_s) + occupied_s
-            if not self._wait_until(end_s):
-                return
-            self._read_out(exposure, snapshot, end_s)
-            due_s += max(occupied_s, 1 / capabilities.frames_per_s)
-            if due_s < time.monotonic() - 1 / capabilities.frames_per_s:
-                due_s = time.monotonic()  # the machine could not keep up
-            sequence += 1
-
-    def _begin_exposure(self, exposure_s: float, sequence: int) -> Exposure:
-        camera = self._camera
-        return Exposure(
-            exposure_s, camera.gain, time.monotonic(), sequence, camera.pixel_format, *camera.size
-        )
-
     def _read_out(self, exposure: Exposure, snapshot: object, end_s: float) -> None:
         """Read the frame into the oldest queued buffer; without one the frame is lost."""
         faults = self._camera.faults
-        with self._change:
+        with self._lock:
             if not self._queued or faults.frozen or faults.unplugged or not self.streaming:
                 return
             index = self._queued.popleft()
@@ -214,13 +182,3 @@ class Stream:
                 buffer.bytes_used //= 2
             self._done.append(index)
             os.eventfd_write(self.ready, 1)
-
-    def _wait_until(self, until_s: float) -> bool:
-        """Wait until a time; return False if the stream was stopped meanwhile."""
-        with self._change:
-            while self.streaming:
-                left_s = until_s - time.monotonic()
-                if left_s <= 0:
-                    return True
-                self._change.wait(left_s)
-        return False

@@ -9,6 +9,7 @@ import pytest
 from drivers.v4l2 import ioctl
 from instrument.config.camera import CameraDefects
 from instrument.errors import DeviceError
+from sim.emulated.v4l2.device import BRIGHTNESS
 from tests.support.v4l2.remote_camera import (
     SETTINGS,
     WHO,
@@ -24,6 +25,7 @@ def test_nothing_is_left_automatic(remote: RemoteCamera, scene: LevelScene) -> N
         remote.ask("open", SETTINGS)
         standing = {c.number: c.value for c in camera.controls().values()}
     assert standing == {
+        BRIGHTNESS: 128,
         ioctl.EXPOSURE_AUTO: 1,
         ioctl.AUTOGAIN: 0,
         ioctl.AUTO_WHITE_BALANCE: 0,
