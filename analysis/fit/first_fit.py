@@ -17,7 +17,7 @@ from analysis.data.measurements import Measurements
 from analysis.fit.criteria import bic, enough_chi2, variance_floor
 from analysis.fit.relative_scale import FACTOR_NAME, relative_model
 from analysis.fit.search.levenberg_marquardt import HUBER, Minimum
-from analysis.fit.search.minima import LOWER, all_minima, to_the_end
+from analysis.fit.search.minima import LOWER, all_minima
 from analysis.fit.search.problem import Problem
 from analysis.fit.search.starting_values import MANY, Grid, Known
 from analysis.models import MODELS, Model
@@ -80,7 +80,7 @@ class FirstFits:
         clear = found[0].chi2 <= enough and m.size >= MANY
         for x in () if clear else self._special_cases(problem):
             if problem.chi2(x) < found[0].chi2 * (1 - LOWER):
-                found.insert(0, to_the_end(problem, x))
+                found.insert(0, problem.solve(x))
         starts = tuple(minimum.x for minimum in found)
         return FirstFit(model, problem, found[0], bic(m, problem, found[0]), starts)
 

@@ -37,10 +37,6 @@ _NEARLY = 2.0
 # Distance to either side of a minimum at which chi2 is looked at, in u, and the factor by which its
 # rise there may differ from that of a parabola; least curvature, relative to the largest.
 _FAR_U, _BENT, _FLAT = 3.0, 2.0, 1e-12
-# Step of a finite difference, relative to the distance from the nearer bound; that distance, as a
-# fraction of the domain, below which a parameter counts as on the bound; second derivative of chi2,
-# in u^2 per unit^2, that underflows.
-_DIFFERENCE, _ON_BOUND, _NO_CURVATURE = 1e-5, 1e-6, 1e-200
 # Relative decrease of chi2 from which another point counts as lower.
 LOWER = 1e-9
 
@@ -57,11 +53,11 @@ def all_minima(
     if problem.brdf.size < MANY:
         beside = [_rough_minimum(problem, start) for start in _starts_beside(problem, found[0].x)]
         found = sorted([*found, *beside], key=_depth)
-    done = [to_the_end(problem, found[0].x)]
+    done = [problem.solve(found[0].x)]
     for one in found[1:]:
         above = (_CLOSE if one.converged else _UNFINISHED) * found[0].chi2 + enough
         if one.chi2 <= found[0].chi2 + above and not _reached(problem, one, done):
-            done.append(to_the_end(problem, one.x))
+            done.append(problem.solve(one.x))
     lowest = min(done, key=_depth)
     if lowest.chi2 <= _NEARLY * enough:
         done.append(_across_the_valley(problem, lowest))
@@ -154,50 +150,12 @@ def _levelled(problem: Problem, x: FloatArray) -> FloatArray:
     return problem.solve(x, shapes, rtol=_LEVEL_RTOL).x
 
 
-def to_the_end(problem: Problem, x: FloatArray) -> Minimum:
-    """Minimum from x (K,), in the model's units, by Newton's steps where Gauss and Newton's crawl.
-
-    The latter leave out the model's second derivatives, which count where residuals are large.
-    """
-    found = problem.solve(x, most_steps=_QUICK_STEPS)
-    for _ in range(_VALLEY):
-        if found.converged:
-            break
-        found = problem.solve(_newton_step(problem, found))
-    return found
-
-
-def _newton_step(problem: Problem, found: Minimum) -> FloatArray:
-    """Parameters (K,) after a step with all second derivatives, or those of `found` if higher."""
-    x = found.x
-    distance = np.minimum(x - problem.low, problem.high - x)
-    inside = distance > _ON_BOUND * (problem.high - problem.low)
-    free = np.flatnonzero(inside & problem.jacobian(x).any(axis=0))
-
-    def gradient(x: FloatArray) -> FloatArray:
-        return problem.jacobian(x, free.tolist()).T @ problem.residual(x)
-
-    here, H = gradient(x), np.empty((free.size, free.size))
-    for k, i in enumerate(free):
-        moved = x.copy()
-        moved[i] += _DIFFERENCE * distance[i]
-        H[k] = (gradient(moved) - here) / (moved[i] - x[i])
-    size = np.sqrt(np.maximum(np.abs(np.diag(H)), _NO_CURVATURE))
-    values, vectors = np.linalg.eigh((H + H.T) / 2 / np.outer(size, size))
-    if free.size == 0 or values[0] <= _FLAT:
-        return x
-    new = x.copy()
-    new[free] -= vectors @ ((vectors.T @ (here / size)) / values) / size
-    new = np.clip(new, problem.low, problem.high)
-    return new if problem.chi2(new) < found.chi2 else x
-
-
 def deepest(problem: Problem, x: FloatArray, others: Iterable[FloatArray]) -> Minimum:
     """Minimum from x (K,), in the model's units, or from any of the others that lies lower."""
-    found = to_the_end(problem, x)
+    found = problem.solve(x)
     for other in others:
         if problem.chi2(other) < found.chi2 * (1 - LOWER):
-            found = min(found, to_the_end(problem, other), key=_depth)
+            found = min(found, problem.solve(other), key=_depth)
     return found
 
 

@@ -50,7 +50,8 @@ class Problem:
         """
         names = (p.name for p in self.model.parameters)
         return self.model.kernel(
-            self.geometry if geometry is None else geometry, **dict(zip(names, x, strict=True))
+            self.geometry if geometry is None else geometry,
+            **dict(zip(names, x.tolist(), strict=True)),
         )
 
     def predict(self, x: FloatArray) -> FloatArray:
@@ -72,7 +73,7 @@ class Problem:
         """
         parameters = self.model.parameters
         gradients = self.model.gradient(
-            self.geometry, **{p.name: float(v) for p, v in zip(parameters, x, strict=True)}
+            self.geometry, **{p.name: v for p, v in zip(parameters, x.tolist(), strict=True)}
         )
         indices = range(x.size) if free is None else free
         columns = [self.gain * gradients[parameters[i].name] for i in indices]
@@ -124,21 +125,27 @@ class Problem:
         self, start: FloatArray, free: list[int], atol: float, rtol: float, most_steps: int
     ) -> Minimum:
         """Search over the free parameters, those marked logarithmic by their logarithms."""
-        by_log = np.array([self.model.parameters[i].logarithmic for i in free])
+        logarithmic = [self.model.parameters[i].logarithmic for i in free]
+        logs = np.flatnonzero(logarithmic)  # their places among the free ones
         least = _LEAST_LOGARITHM * self.high[free]
 
         def searched(x: FloatArray) -> FloatArray:
-            positive = np.where(by_log, np.maximum(x[free], least), 1.0)
-            return np.where(by_log, np.log(positive), x[free])
+            y = x[free]
+            y[logs] = np.log(np.maximum(y[logs], least[logs]))
+            return y
 
         def full(y: FloatArray) -> FloatArray:
-            x = start.copy()
-            x[free] = np.clip(np.where(by_log, np.exp(np.where(by_log, y, 0.0)), y), low, high)
+            x, values = start.copy(), y.copy()
+            if logs.size:  # rounding may put the end of a domain beyond it
+                values[logs] = np.clip(np.exp(y[logs]), low[logs], high[logs])
+            x[free] = values
             return x
 
         def jacobian(y: FloatArray) -> FloatArray:
             x = full(y)
-            return self.jacobian(x, free) * np.where(by_log, x[free], 1.0)
+            J = self.jacobian(x, free)
+            J[:, logs] *= x[free][logs]
+            return J
 
         low, high = self.low[free], self.high[free]
         ends = searched(self.low), searched(self.high)

@@ -86,34 +86,39 @@ def transmittance(theta: ArrayLike, n: ArrayLike) -> FloatArray:
     `theta`, in radians on the outer side, and `n` broadcast. The reverse light path has the same
     transmittance: 1 - F(theta, n) = 1 - F(asin(sin(theta)/n), 1/n), both factors of 1998 (7).
     """
-    c, n, q = _cosines(theta, n)
-    n2 = n * n
+    n = np.asarray(n, dtype=np.float64)
+    if not np.all(n >= 1):
+        raise ValueError(f"n = {_first_outside(n, n >= 1):g}; allowed: 1 or more")
+    return transmittance_at_cosine(np.cos(polar("theta", theta)), n)
+
+
+def transmittance_at_cosine(c: FloatArray, n: FloatArray | float) -> FloatArray:
+    """`transmittance` at the cosines c of 0 to 1 of theta, dimensionless; c and n broadcast."""
+    n2, q = n * n, np.sqrt((n - 1) * (n + 1) + c * c)
     result: FloatArray = 2 * c * q * (1 / np.square(c + q) + n2 / np.square(n2 * c + q))
     return result
 
 
 def transmittance_with_gradients(
-    theta: ArrayLike, n: ArrayLike
+    c: FloatArray, n: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """`transmittance` and its derivatives by n and by cos(theta).
+    """`transmittance_at_cosine` and its derivatives by n and by c, (N,) each, dimensionless.
 
-    Arguments (radians) and shapes as there.
-
-    That by n grows without limit at grazing for n = 1. 1 - F is 1 - (F_perp^2 + F_para^2)/2, with
+    That by n grows without limit at grazing for n = 1. The function is 1 - (F_perp^2 + F_para^2)/2,
+    and
 
         d(F_perp)/dn = -2 n c / (q (c + q)^2),   d(F_para)/dn = 2 n c (2 q^2 - n^2) / (q P)
         d(F_perp)/dc = 2 (n^2 - 1) / (q (c + q)^2),   d(F_para)/dc = 2 n^2 (n^2 - 1) / (q P)
 
-    for c = cos(theta), q = sqrt(n^2 - sin^2 theta) and P = (n^2 c + q)^2, from dq/dn = n/q and
-    dq/dc = c/q.
+    with q = sqrt(n^2 - sin^2 theta) and P = (n^2 c + q)^2, from dq/dn = n/q and dq/dc = c/q.
     """
-    c, n, q = _cosines(theta, n)
     n2, n2_1 = n * n, (n - 1) * (n + 1)
+    q = np.sqrt(n2_1 + c * c)
     p, P = np.square(c + q), np.square(n2 * c + q)
     perp, para = -n2_1 / (p * p), n2_1 * ((n2 + 1) * c * c - 1) / (P * P)
-    transmitted: FloatArray = 2 * c * q * (1 / p + n2 / P)
-    by_n: FloatArray = 2 * n * c / q * (perp - para * (2 * q * q - n2))
-    by_cosine: FloatArray = -2 * n2_1 / q * (perp + n2 * para)
+    transmitted = 2 * c * q * (1 / p + n2 / P)
+    by_n = 2 * n * c / q * (perp - para * (2 * q * q - n2))
+    by_cosine = -2 * n2_1 / q * (perp + n2 * para)
     return transmitted, by_n, by_cosine
 
 
@@ -128,14 +133,6 @@ def wolff_polynomial(theta: ArrayLike, epsilon: float = 0.07) -> FloatArray:
         raise ValueError(f"epsilon = {epsilon:g}; allowed: 0 or more")
     fifth = np.power(polar("theta", theta) * (2 / np.pi), 5)
     return np.asarray((fifth + epsilon) / (1 + epsilon), dtype=np.float64)
-
-
-def _cosines(theta: ArrayLike, n: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """cos(theta), n and q = n cos(theta_t) = sqrt(n^2 - sin^2 theta)."""
-    c, n = np.cos(polar("theta", theta)), np.asarray(n, dtype=np.float64)
-    if not np.all(n >= 1):
-        raise ValueError(f"n = {_first_outside(n, n >= 1):g}; allowed: 1 or more")
-    return c, n, np.sqrt((n - 1) * (n + 1) + c * c)
 
 
 def _squared_modulus(f: ComplexArray) -> FloatArray:

@@ -14,7 +14,7 @@ import numpy as np
 
 from analysis.models.base import cached_per_geometry
 from analysis.models.smooth.fresnel import (
-    transmittance,
+    transmittance_at_cosine,
     transmittance_with_gradients,
     wolff_polynomial,
 )
@@ -25,21 +25,24 @@ _MOST_SEARCHED = 4096
 
 
 @cached_per_geometry
-def distinct_angles(geometry: Geometry) -> tuple[FloatArray, IntArray]:
-    """Angles of lamp and camera in radians, (M,), and the index (2, ...) of both among them."""
+def distinct_cosines(geometry: Geometry) -> tuple[FloatArray, IntArray]:
+    """Cosines (M,) of the distinct angles of lamp and camera, and the index (2, ...) of both.
+
+    Dimensionless.
+    """
     both = np.stack([geometry.theta_i, geometry.theta_r])
     if both.size > _MOST_SEARCHED:
-        return both.ravel(), np.arange(both.size).reshape(both.shape)
+        return np.cos(both.ravel()), np.arange(both.size).reshape(both.shape)
     angles, index = np.unique(both, return_inverse=True)
-    return angles, np.reshape(index, both.shape)
+    return np.cos(angles), np.reshape(index, both.shape)
 
 
-def refracted(theta: FloatArray, n: float) -> FloatArray:
+def refracted(cosine: FloatArray, n: float) -> FloatArray:
     """Cosine inside: sqrt(1 - sin^2(theta)/n^2), accurate at grazing for n near 1.
 
-    Of the shape of `theta`, in radians.
+    Of the shape of `cosine`, that of theta outside; dimensionless.
     """
-    squared = (n - 1) * (n + 1) + np.square(np.cos(theta))
+    squared = (n - 1) * (n + 1) + cosine * cosine
     return np.asarray(np.minimum(np.sqrt(squared) / n, 1.0))  # rounding may leave it above 1
 
 
@@ -49,20 +52,22 @@ def both_transmittances(geometry: Geometry, n: float, epsilon: float | None = No
     Dimensionless, of the geometry's shape. The way out transmits like the way in from theta_r. With
     an `epsilon` by Wolff's polynomial.
     """
-    theta, index = distinct_angles(geometry)
-    one = transmittance(theta, n) if epsilon is None else 1 - wolff_polynomial(theta, epsilon)
-    lamp, camera = one[index]
-    return np.asarray(lamp * camera)
+    if epsilon is not None:
+        F_i, F_r = (wolff_polynomial(t, epsilon) for t in (geometry.theta_i, geometry.theta_r))
+        return (1 - F_i) * (1 - F_r)
+    cosine, index = distinct_cosines(geometry)
+    T = transmittance_at_cosine(cosine, n)[index]
+    return np.asarray(T[0] * T[1])
 
 
 def both_with_gradient(geometry: Geometry, n: float) -> tuple[FloatArray, FloatArray]:
     """The exact `both_transmittances` and its derivative by n, of the geometry's shape."""
-    theta, index = distinct_angles(geometry)
-    one, by_n, _ = transmittance_with_gradients(theta, n)
+    cosine, index = distinct_cosines(geometry)
+    one, by_n, _ = transmittance_with_gradients(cosine, n)
     T, dT = one[index], by_n[index]
     return T[0] * T[1], T[1] * dT[0] + T[0] * dT[1]
 
 
 def log_lowest(n: float) -> float:
     """ln of the cosine inside at grazing, the lowest of all rays."""
-    return math.log(float(refracted(np.array(np.pi / 2), n)))
+    return math.log(float(refracted(np.cos(np.array(np.pi / 2)), n)))

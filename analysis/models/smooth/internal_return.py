@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.models.smooth.chandrasekhar import HFunction, h_exact, h_order
-from analysis.models.smooth.fresnel import transmittance, transmittance_with_gradients
+from analysis.models.smooth.fresnel import transmittance_at_cosine, transmittance_with_gradients
 from analysis.models.smooth.interface import log_lowest, refracted
 from analysis.models.tanh_rule import W, X
 from instrument.geometry import FloatArray
@@ -138,10 +138,9 @@ def _inside(n: float) -> _Inside:
     """
     critical = math.sqrt((n - 1) * (n + 1)) / n
     c, dc = _CLUSTERED if n >= _BEND_INSIDE else (X, W)
-    outside, above_1 = np.arccos(c), max(n, 1 + _OFF_ONE)
-    x = np.concatenate([critical * c, refracted(outside, n)])
-    _, by_n, by_c = transmittance_with_gradients(outside, above_1)
-    F = 1 - transmittance(outside, n)
+    x, above_1 = np.concatenate([critical * c, refracted(c, n)]), max(n, 1 + _OFF_ONE)
+    _, by_n, by_c = transmittance_with_gradients(c, above_1)
+    F = 1 - transmittance_at_cosine(c, n)
     F_x_dx = np.concatenate([critical * dc * critical * c, F * dc * c / (n * n)])
     dF = (1 - c) * (1 + c) / above_1 * by_c - c * by_n
     F_by_n_dx = np.concatenate([np.zeros_like(c), dF * dc / (above_1 * above_1)])

@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity
 from analysis.models.smooth.fresnel import transmittance_with_gradients
-from analysis.models.smooth.interface import both_transmittances, distinct_angles, refracted
+from analysis.models.smooth.interface import both_transmittances, distinct_cosines, refracted
 from analysis.models.smooth.internal_return import h_and_k, rays
 from analysis.models.validity import GRAZING, both_graze, valid_except
 from instrument.geometry import FloatArray, Geometry
@@ -50,8 +50,8 @@ def wolff_brdf(
     3.7 % at n = 2, and none at n = 1. For the same reason diffuse and mirror reflection together
     exceed 1 at rho = 1, by up to 1.3 % (n = 1.2, normal incidence; 1.0 % for n = 1.5).
     """
-    theta, index = distinct_angles(geometry)
-    mu = refracted(theta, n)
+    cosine, index = distinct_cosines(geometry)
+    mu = refracted(cosine, n)
     H, K = h_and_k(mu, single_scattering_albedo, n, order)
     varrho = _varrho(mu[index], H[index], K[index[1]], single_scattering_albedo, n)
     return np.asarray(varrho * both_transmittances(geometry, n, epsilon))
@@ -65,8 +65,8 @@ def wolff_gradient(
     That by rho grows without limit as 1/sqrt(1 - rho): at rho = 1 that of 1 - 1e-12 is returned.
     """
     rho = single_scattering_albedo
-    theta, index = distinct_angles(geometry)
-    ray, (through, through_by_n, _) = refracted(theta, n), transmittance_with_gradients(theta, n)
+    cosine, index = distinct_cosines(geometry)
+    ray, (through, through_by_n, _) = refracted(cosine, n), transmittance_with_gradients(cosine, n)
     mu, T, dT = ray[index], through[index], through_by_n[index]
     inside = rays(ray, rho, n)
     by_rho, by_n = inside.log_h_by_rho[index], inside.log_h_by_n[index]
@@ -102,7 +102,7 @@ def ray_terms(
 
     With an `order` H is Chandrasekhar's of that order, in K too.
     """
-    H, K = h_and_k(refracted(theta, n), single_scattering_albedo, n, order)
+    H, K = h_and_k(refracted(np.cos(theta), n), single_scattering_albedo, n, order)
     return H, 1 - K
 
 

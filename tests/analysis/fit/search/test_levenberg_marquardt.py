@@ -257,6 +257,31 @@ def test_rosenbrock_valley(
     assert found.x == pytest.approx(minimum, abs=1e-6)
 
 
+def test_large_residuals_do_not_make_the_search_crawl() -> None:
+    """Problem of Brown and Dennis, minimum 85822.2; without second derivatives 1000 steps fail.
+
+    J. J. Moré, B. S. Garbow, K. E. Hillstrom, "Testing Unconstrained Optimization Software", ACM
+    Transactions on Mathematical Software 7 (1981), problem 16.
+    """
+    t = np.arange(1, 21) / 5
+
+    def parts(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return x[0] + t * x[1] - np.exp(t), x[2] + x[3] * np.sin(t) - np.cos(t)
+
+    def residual(x: FloatArray) -> FloatArray:
+        a, b = parts(x)
+        return a * a + b * b
+
+    def jacobian(x: FloatArray) -> FloatArray:
+        a, b = parts(x)
+        return 2 * np.stack([a, a * t, b, b * np.sin(t)], axis=1)
+
+    start, far = np.array([25.0, 5.0, -5.0, -1.0]), np.full(4, 100.0)
+    found = descend(residual, jacobian, start, -far, far, most_steps=40)  # takes 28
+    assert found.converged
+    assert found.chi2 == pytest.approx(85822.2, abs=0.05)
+
+
 def test_no_minimum_is_reported_with_wrong_derivatives() -> None:
     claimed = 0
     for seed in SEEDS:
