@@ -29,6 +29,7 @@ HANDLER = "gonio.replace"
 
 PATIENCE_S = 2.0  # then text for standard error is dropped: a stalled terminal stalls no scan
 _GONE = frozenset({errno.EPIPE, errno.EIO, errno.EBADF, errno.ENXIO, errno.ECONNRESET})
+_TICK_MS = 100
 _CHUNK = select.PIPE_BUF  # a descriptor that is ready takes so many bytes without waiting
 
 _IN_ASCII = {
@@ -96,7 +97,9 @@ class _LastingFile(io.FileIO):
         poll = select.poll()
         poll.register(self.fileno(), select.POLLOUT)
         if self._patience_s is None:
-            return bool(poll.poll())
+            while not poll.poll(_TICK_MS):  # a signal just before a wait would not end it
+                pass
+            return True
         self._stalled = not poll.poll(0 if self._stalled else 1e3 * self._patience_s)
         return not self._stalled
 

@@ -132,3 +132,23 @@ def test_a_wait_for_a_reader_that_was_interrupted_is_not_repeated(
         threading.Timer(0.2, signal.pthread_kill, (threading.get_ident(), signal.SIGINT)).start()
         with pytest.raises(KeyboardInterrupt), lasting_streams():
             sys.stdout.writelines("x" * 4095 + "\n" for _ in range(100))
+
+
+class _Interrupted:
+    """Poll object of a reader that never reads; the interrupt came just before the wait began."""
+
+    def register(self, descriptor: int, events: int) -> None: ...
+
+    def poll(self, timeout_ms: float | None = None) -> list[tuple[int, int]]:
+        assert timeout_ms is not None, "waits for ever: the interrupt is never seen"
+        raise KeyboardInterrupt
+
+
+def test_an_interrupt_just_before_a_wait_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python looks for signals between calls, not once the system's wait has begun."""
+    reading, writing = os.pipe()
+    with os.fdopen(reading, "rb", 0), os.fdopen(writing, "w", encoding="utf-8") as ours:
+        monkeypatch.setattr(sys, "stdout", ours)
+        monkeypatch.setattr(streams.select, "poll", _Interrupted)
+        with pytest.raises(KeyboardInterrupt), lasting_streams():
+            sys.stdout.writelines("x" * 4095 + "\n" for _ in range(100))
