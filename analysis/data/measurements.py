@@ -8,7 +8,7 @@ know which points share an error.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -64,6 +64,7 @@ class Measurements:
         theta_r share its error.
     relative: `brdf` and `u_random` are radiance in a unit of its own, without a reference.
     free_levels: the lamp's brightness at each of its settings is unknown.
+    geometry: (N,), that of the points; one object, so that models compute once what depends on it.
 
     Raises `ValueError` for shapes that differ, values that are not finite, angles outside their
     domain, a `u_random` that is not positive, or a negative uncertainty of an angle.
@@ -81,6 +82,7 @@ class Measurements:
     u_dphi_deg: float = 0.0
     relative: bool = False
     free_levels: bool = False
+    geometry: Geometry = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         self._check_arrays()
@@ -90,7 +92,10 @@ class Measurements:
                 raise ValueError(f"{name} = {value:g}; allowed: finite, 0 or more")
             if value > 0 and self.u_random is None:
                 raise ValueError(f"{name} = {value:g} is stated, so u_random must be stated too")
-        _ = self.geometry  # its own checks: angles within their domain
+        geometry = Geometry.from_degrees(  # checks that the angles are within their domain
+            theta_i=self.theta_i_deg, theta_r=self.theta_r_deg, dphi=self.dphi_deg
+        )
+        object.__setattr__(self, "geometry", geometry)
 
     def _check_arrays(self) -> None:
         arrays = {name: getattr(self, name) for name in _ARRAYS}
@@ -138,13 +143,6 @@ class Measurements:
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         chosen = {name: array[points] for name, array in arrays.items() if array is not None}
         return replace(self, **chosen, shared=tuple(error.subset(points) for error in self.shared))
-
-    @property
-    def geometry(self) -> Geometry:
-        """Geometry (N,) of the points, from their angles in degrees."""
-        return Geometry.from_degrees(
-            theta_i=self.theta_i_deg, theta_r=self.theta_r_deg, dphi=self.dphi_deg
-        )
 
     @property
     def size(self) -> int:

@@ -25,13 +25,14 @@ def sweeps(m: Measurements) -> list[Sweep]:
     plane, views = plane_and_view(m)
     settings = np.stack([np.round(m.theta_i_deg, _DECIMALS), plane], axis=1)
     values, member = np.unique(settings, axis=0, return_inverse=True)
-    found = []
-    for n, (theta_i, dphi) in enumerate(values):
-        points = np.flatnonzero(member.reshape(-1) == n)
-        if points.size > 1:
-            order = np.argsort(views[points], kind="stable")
-            found.append(Sweep(float(theta_i), float(dphi), points[order]))
-    return found
+    member = member.reshape(-1)
+    order = np.lexsort((views, member))
+    groups = np.split(order, np.cumsum(np.bincount(member))[:-1])
+    return [
+        Sweep(theta_i, dphi, points)
+        for (theta_i, dphi), points in zip(values.tolist(), groups, strict=True)
+        if points.size > 1
+    ]
 
 
 def plane_and_view(m: Measurements) -> tuple[FloatArray, FloatArray]:

@@ -18,6 +18,7 @@ import numpy as np
 from instrument.geometry import BoolArray, FloatArray, Geometry, IntArray
 
 Kernel = Callable[..., FloatArray]
+R = TypeVar("R")
 T = TypeVar("T", bound=FloatArray | tuple[FloatArray | IntArray, ...])
 
 Ranges = Mapping[str, tuple[float, float]]
@@ -44,6 +45,26 @@ def cached_per_geometry(function: Callable[[Geometry], T]) -> Callable[[Geometry
             for array in value if isinstance(value, tuple) else (value,):
                 array.setflags(write=False)
             cache[geometry] = value
+        return value
+
+    return cached
+
+
+def last_per_geometry(function: Callable[..., R]) -> Callable[..., R]:
+    """Decorator: keep the last result of a function of a geometry and of parameters.
+
+    A fit evaluates a model and then its derivatives at the same parameters. As with
+    `cached_per_geometry`, for geometries of up to two blocks.
+    """
+    cache: WeakKeyDictionary[Geometry, tuple[tuple[float, ...], R]] = WeakKeyDictionary()
+
+    @wraps(function)
+    def cached(geometry: Geometry, *parameters: float) -> R:
+        if geometry in cache and cache[geometry][0] == parameters:
+            return cache[geometry][1]
+        value = function(geometry, *parameters)
+        if math.prod(geometry.shape) <= 2 * BLOCK:
+            cache[geometry] = parameters, value
         return value
 
     return cached

@@ -27,6 +27,8 @@ from instrument.geometry import FloatArray
 _BEND_INSIDE = 1.00001
 # Up to so many cosines, direct evaluation is cheaper than making a series.
 _FEW_COSINES = 64
+# Cosines at once: their Chebyshev polynomials stay in cache.
+_CHUNK = 2048
 # Distance from 1 of rho and of n, at which a derivative grows without limit.
 _OFF_ONE = 1e-12
 
@@ -193,4 +195,9 @@ def _chebyshev(n: float) -> tuple[FloatArray, FloatArray]:
 def _evaluate(series: FloatArray, mu: FloatArray, n: float) -> FloatArray:
     """The functions of the series, first axis, at the cosines inside."""
     z = 1 - 2 * np.log(np.minimum(mu, 1.0)) / log_lowest(n)
-    return np.asarray(np.polynomial.chebyshev.chebval(z, series))
+    values = np.empty((series.shape[1], mu.size))
+    for start in range(0, mu.size, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        terms = np.polynomial.chebyshev.chebvander(z[part], len(series) - 1)
+        values[:, part] = (terms @ series).T
+    return values

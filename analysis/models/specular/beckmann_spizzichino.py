@@ -19,8 +19,8 @@ import math
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity
-from analysis.models.specular.poisson_sums import poisson_sum, poisson_sums
+from analysis.models.base import Model, Parameter, Validity, last_per_geometry
+from analysis.models.specular.poisson_sums import Terms, poisson_terms, summed
 from analysis.models.specular.surface_statistics import (
     check_lengths,
     curvature_radius,
@@ -63,23 +63,33 @@ def lobe_brdf(
     `scale`. Diverges as
     1/cosθ at grazing, as printed.
     """
-    g, q = optical_roughness(geometry, sigma_h), lobe_exponent(geometry, correlation_length)
-    return scale * lobe_factor(geometry, correlation_length) * poisson_sum(g, q, _per_m)
+    terms = _terms(geometry, sigma_h, correlation_length)
+    lobe = summed(terms, _per_m, geometry.shape)
+    return scale * lobe_factor(geometry, correlation_length) * lobe
 
 
 def lobe_gradient(
     geometry: Geometry, scale: float, sigma_h: float, correlation_length: float
 ) -> dict[str, FloatArray]:
     """Derivatives of `lobe_brdf` by its parameters, sums over m again. As in `Model.gradient`."""
-    g, q = optical_roughness(geometry, sigma_h), lobe_exponent(geometry, correlation_length)
+    terms = _terms(geometry, sigma_h, correlation_length)
     factor = lobe_factor(geometry, correlation_length)
-    lobe, by_ln_g, by_ln_t2 = poisson_sums(g, q, (_per_m, _by_ln_g, _by_ln_t2))
+    lobe, by_ln_g, by_ln_t2 = (
+        summed(terms, weight, geometry.shape) for weight in (_per_m, _by_ln_g, _by_ln_t2)
+    )
     per_sigma = scale * 2 / sigma_h if sigma_h > 1e-150 else 0.0  # f rises as sigma_h^2
     return {
         "scale": factor * lobe,
         "sigma_h": per_sigma * factor * by_ln_g,
         "correlation_length": scale * 2 / correlation_length * factor * by_ln_t2,
     }
+
+
+@last_per_geometry
+def _terms(geometry: Geometry, sigma_h: float, correlation_length: float) -> tuple[Terms, ...]:
+    """Terms of the lobe's sum: a fit asks for the lobe and then for its derivatives there."""
+    g, q = optical_roughness(geometry, sigma_h), lobe_exponent(geometry, correlation_length)
+    return tuple(poisson_terms(g, q))
 
 
 def lobe_validity(

@@ -34,3 +34,10 @@ def test_a_seeded_scan_has_the_stated_truth() -> None:
     assert m.size == 96  # 99 less the one next to the lamp at each incidence
     np.testing.assert_allclose(m.brdf, 0.5 / np.pi, rtol=1e-10)
     assert np.unique(m.lamp_setting).size == 3
+
+
+def test_all_fits_to_measurements_share_one_geometry_and_what_models_keep_of_it() -> None:
+    m = scan("oren_nayar", 1, albedo=0.8, sigma_deg=25.0)
+    assert m.geometry is m.geometry
+    closer = replace(m, theta_r_deg=m.theta_r_deg / 2)
+    np.testing.assert_array_equal(closer.geometry.theta_r_deg, m.geometry.theta_r_deg / 2)

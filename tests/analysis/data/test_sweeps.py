@@ -11,6 +11,7 @@ from analysis.data.measurements import Measurements
 from analysis.data.sweeps import plane_and_view, signed_view, sweeps
 from instrument.geometry import Geometry
 from tests.support.analysis.seeded_scan import three_sweeps
+from tests.support.cpu_time import cpu_ratio
 
 
 def test_sweeps_are_by_incidence_and_plane_with_rising_view() -> None:
@@ -54,3 +55,16 @@ def test_plane_and_view_are_the_same_direction(theta_r: float, dphi: float) -> N
     if abs(theta_r) > 1e-6:
         turn = np.radians(here.dphi_deg - m.geometry.dphi_deg)
         assert np.cos(turn) == pytest.approx(1, abs=1e-10)
+
+
+def test_the_cost_of_sweeps_rises_as_the_number_of_points() -> None:
+    """Every point is its own sweep but for chance: a search of all points for each would square."""
+
+    def scattered(n: int) -> Measurements:
+        rng = np.random.default_rng(n)
+        return Measurements.bare(rng.uniform(0, 75, n), rng.uniform(-80, 80, n), 0.0, np.ones(n))
+
+    many, few = scattered(64_000), scattered(4_000)
+    assert (
+        cpu_ratio(lambda: sweeps(many), lambda: sweeps(few), 3) < 28
+    )  # about 17; 45 with a search of all points for each sweep

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.models import MODELS, Model, Parameter
-from analysis.models.base import add
+from analysis.models.base import add, last_per_geometry
 from instrument.geometry import Geometry
 from tests.support.models.derivatives import central_difference
 from tests.support.models.geometries import (
@@ -151,3 +151,22 @@ def test_a_value_that_is_not_a_number_is_refused(value: object) -> None:
     geometry = Geometry.from_degrees(theta_i=30, theta_r=30)
     with pytest.raises(ValueError, match=r"sigma_deg = .*allowed: 0 to 60 degrees"):
         MODELS["oren_nayar"].brdf(geometry, albedo=0.5, sigma_deg=value)  # type: ignore[arg-type]  # wrong on purpose
+
+
+def test_the_last_result_is_kept_for_the_same_geometry_and_parameters_alone() -> None:
+    asked = []
+
+    @last_per_geometry
+    def total(geometry: Geometry, a: float, b: float) -> float:
+        asked.append((a, b))
+        return float(geometry.theta_i_deg.sum()) + a + b
+
+    one, other = (Geometry.from_degrees(theta_i=[t, t], theta_r=10.0) for t in (20.0, 30.0))
+    assert [total(one, 1.0, 2.0), total(one, 1.0, 2.0)] == [43.0, 43.0]
+    assert asked == [(1.0, 2.0)]
+    assert [total(other, 1.0, 2.0), total(one, 1.0, 3.0), total(one, 1.0, 2.0)] == [
+        63.0,
+        44.0,
+        43.0,
+    ]
+    assert len(asked) == 4
