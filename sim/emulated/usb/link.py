@@ -19,13 +19,17 @@ class Link:
     """Cable between a device and one importing computer; `serve` runs until either end pulls it.
 
     A transfer is completed, or withdrawn by UNLINK, under one lock: the computer gets exactly one
-    answer for it.
+    answer for it. Linux's vhci_tx sends an UNLINK before its SUBMIT if the transfer is withdrawn at
+    the moment between the two queues that it empties in turn; such an UNLINK is answered when the
+    transfer arrives, because vhci_rx takes the connection for broken if both are answered.
     """
 
     def __init__(self, connection: socket.socket, device: UsbDevice) -> None:
         self._connection, self._device = connection, device
         self._read = usbip.exactly(connection.recv)
         self._waiting: defaultdict[int, deque[Submit]] = defaultdict(deque)
+        self._last_seqnum = 0  # of the transfers: they arrive in order
+        self._early_unlinks: dict[int, int] = {}  # number of a transfer to come: of its UNLINK
         self._change = threading.Condition()
         self._pulled = False
 
@@ -85,6 +89,14 @@ class Link:
     # The computer's side
 
     def _submit(self, transfer: Submit) -> None:
+        self._last_seqnum = transfer.seqnum
+        if transfer.seqnum in self._early_unlinks:
+            unlink = self._early_unlinks.pop(transfer.seqnum)
+            self._reply(Unlinked(unlink, -errno.ECONNRESET))
+        else:
+            self._carry_out(transfer)
+
+    def _carry_out(self, transfer: Submit) -> None:
         address = transfer.ep | (IN if transfer.direction == usbip.IN else 0)
         try:
             if transfer.ep == 0:
@@ -109,6 +121,9 @@ class Link:
             self._reply(Submitted(transfer.seqnum, 0, len(answer), answer[: transfer.length]))
 
     def _unlink(self, command: Unlink) -> None:
+        if command.unlink_seqnum > self._last_seqnum:
+            self._early_unlinks[command.unlink_seqnum] = command.seqnum
+            return
         with self._change:
             for queue in self._waiting.values():
                 for transfer in queue:

@@ -142,6 +142,17 @@ def test_each_transfer_is_completed_or_withdrawn_never_both(
     assert completed
 
 
+def test_an_unlink_that_overtakes_its_transfer(echo: Echo, client: UsbIpClient) -> None:
+    """Seen with Linux 6.1: answered when the transfer arrives, which is then not carried out."""
+    early = client.unlink(3)
+    assert client.control_in(0, 0, 0, 0, 2) == b"\0\0"  # transfer 2, not concerned
+    assert client.submit(SINK, 1, b"x") == 3
+    assert client.reply() == Unlinked(early, -errno.ECONNRESET)
+    later = client.submit(SINK, 1, b"y")
+    assert client.reply() == Submitted(later, 0, 1)
+    assert echo.received == [b"y"]
+
+
 def test_a_halted_endpoint_stalls_until_it_is_cleared(echo: Echo, client: UsbIpClient) -> None:
     client.control_out(0x02, 3, 0, SINK)  # SET_FEATURE(ENDPOINT_HALT)
     assert client.control_in(0x02, 0, 0, SINK, 2) == b"\1\0"
