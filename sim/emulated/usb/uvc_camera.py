@@ -7,11 +7,14 @@ control, "SET_CUR GAIN" one for that control, "GET_CUR" one that reads it.
 Transcripts: descriptors as of uncompressed bulk cameras in the UVC 1.1 documents. Not verified on a
 device: numbers of terminals and units, range of the controls, the error codes after a stall. As in
 small cameras without a memory, a frame that nobody awaits at the end of its exposure is lost.
+Properties of the model that USB does not have (padding of rows, time stamps, states of buffers) are
+ignored.
 """
 
 from __future__ import annotations
 
 import errno
+import time
 from collections.abc import Iterator
 
 from sim.emulated.usb import usbip
@@ -51,10 +54,14 @@ _REQUEST_ERROR_CODE = 2
 _WRONG_STATE, _OUT_OF_RANGE, _INVALID_UNIT, _INVALID_CONTROL, _UNKNOWN = 2, 4, 5, 6, 0xFF
 _ERROR_CODES = {errno.EACCES: _WRONG_STATE, errno.ERANGE: _OUT_OF_RANGE}
 _PRODUCT_ID = 0x0001
+_LATE_S = 0.02
 
 
 class UvcCamera(UsbDevice):
-    """A model of a camera as a USB device. `rates`: frames/s, the default first."""
+    """A model of a camera as a USB device.
+
+    `rates`: frames/s, the default first; none above the model's limit.
+    """
 
     def __init__(
         self,
@@ -63,6 +70,9 @@ class UvcCamera(UsbDevice):
         manufacturer: str = "Emulated Optics",
         serial: str = "SN0042",
     ) -> None:
+        limit = camera.capabilities.frames_per_s
+        if not rates or max(rates) > limit:
+            raise ValueError(f"rates {rates}: at least one, and none above the model's {limit}/s")
         self.camera = camera
         self._controls = UvcControls(camera)
         self._sensor = FreeRunningSensor(camera, self._read_out, self._interrupt)
@@ -148,6 +158,8 @@ class UvcCamera(UsbDevice):
         except Refused as refusal:
             raise Stall from refusal
         if request == "SET_CUR":
+            if len(data) != PROBE_BYTES:
+                raise Stall(f"{name} of {len(data)} bytes")
             self._probe = self._nearest(Probe.parse(data))
             if selector == _COMMIT:
                 self._start()
@@ -190,28 +202,39 @@ class UvcCamera(UsbDevice):
         if self.cable is not None:
             self.cable.wake()
 
-    def _read_out(self, exposure: Exposure, snapshot: object, _end_s: float) -> None:
-        """Send a frame, if the computer awaits one when it begins."""
+    def _read_out(self, exposure: Exposure, snapshot: object, end_s: float) -> None:
+        """Send a frame, if the computer awaits one at the end of its exposure.
+
+        uvcvideo stamps a frame with the time of its first payload. That is a mere header, sent
+        before the picture is rendered; if this thread woke too late even for that, the frame is
+        lost, as its stamp would be wrong.
+        """
         cable, faults = self.cable, self.camera.faults
-        if cable is None or faults.frozen or not cable.awaited(VIDEO_ENDPOINT):
+        late_s = time.monotonic() - end_s
+        if cable is None or faults.frozen or late_s > max(self.camera.frame_interval_s, _LATE_S):
+            return
+        if not cable.awaited(VIDEO_ENDPOINT):
+            return
+        bad = faults.bad_frames.popleft() if faults.bad_frames else None
+        flags = END_OF_HEADER | self._frame_id | (ERROR if bad == "flagged" else 0)
+        self._frame_id ^= FRAME_ID
+        if not self._send(cable, bytes([HEADER_BYTES, flags])):
             return
         data = self.camera.frame_bytes(exposure, snapshot).tobytes()
-        bad = faults.bad_frames.popleft() if faults.bad_frames else None
-        if bad == "short":
-            data = data[: len(data) // 2]
-        flags = self._frame_id | (ERROR if bad == "flagged" else 0)
-        for payload in payloads(data, flags):
-            if not cable.send(VIDEO_ENDPOINT, payload, lambda: self._sensor.running):
+        for payload in payloads(data[: len(data) // 2] if bad == "short" else data, flags):
+            if not self._send(cable, payload):
                 return
-        self._frame_id ^= FRAME_ID
+
+    def _send(self, cable: Cable, payload: bytes) -> bool:
+        return cable.send(VIDEO_ENDPOINT, payload, lambda: self._sensor.running)
 
 
 def payloads(frame: bytes, flags: int) -> Iterator[bytes]:
-    """Yield a frame as payloads, each with its header; the last one ends the frame."""
+    """Yield a frame as payloads, each with a header of these flags; the last ends the frame."""
     step = PAYLOAD_BYTES - HEADER_BYTES
     for begin in range(0, len(frame), step):
         last = END_OF_FRAME if begin + step >= len(frame) else 0
-        yield bytes([HEADER_BYTES, END_OF_HEADER | flags | last]) + frame[begin : begin + step]
+        yield bytes([HEADER_BYTES, flags | last]) + frame[begin : begin + step]
 
 
 def _formats(camera: EmulatedCamera, rates: tuple[int, ...]) -> list[Format]:

@@ -16,7 +16,9 @@ from sim.emulated.v4l2.device import BYTES_PER_PIXEL, Capabilities, EmulatedCame
 from tests.support.usb.usbip_client import imported
 from tests.support.usb.uvc_host import UvcHost
 
-QUICK = Capabilities(card="Mono camera", sizes=((64, 48), (200, 100)), overhead_s=0.0005)
+QUICK = Capabilities(
+    card="Mono camera", sizes=((64, 48), (200, 100)), frames_per_s=500, overhead_s=0.0005
+)
 RATES = (500, 250, 100)
 
 

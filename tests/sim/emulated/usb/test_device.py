@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
+from dataclasses import replace
+
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from sim.emulated.usb import descriptors
-from sim.emulated.usb.acm_port import AcmWire
+from sim.emulated.usb.acm_port import AcmPort, AcmWire
+from sim.emulated.usb.descriptors import DeviceIdentity
 from sim.emulated.usb.device import Setup, Stall, UsbDevice
 from sim.emulated.usb.uvc_camera import UvcCamera
 from sim.emulated.v4l2.device import EmulatedCamera
 from tests.support.usb.cameras import render
 
 IN = 0x80
+IDENTITY = DeviceIdentity("Maker", "Port", "1", 0x0002)
 
 
 @pytest.fixture(params=["camera", "serial port"])
@@ -73,6 +80,26 @@ def test_everything_else_stalls(
 ) -> None:
     with pytest.raises(Stall):
         ask(device, kind, request_number, value, index, 64)
+
+
+@settings(max_examples=200)
+@given(
+    st.builds(Setup, *[st.integers(0, 255)] * 2, *[st.integers(0, 65535)] * 3),
+    st.sampled_from((0x21, 0x22, 0xA1, 0x00, 0x80, 0x81, 0x02)),
+    st.integers(0, 0x0B),
+    st.integers(0, 3),
+    st.binary(max_size=40),
+)
+def test_any_request_is_answered_or_stalls(
+    setup: Setup, kind: int, selector: int, entity: int, data: bytes
+) -> None:
+    """Drawn at random, and near to requests that exist."""
+    near = replace(setup, request_type=kind, value=selector << 8, index=entity << 8)
+    for device in (UvcCamera(EmulatedCamera(render)), AcmPort(IDENTITY, lambda _: None)):
+        for one in (setup, near, replace(near, index=1), replace(near, index=0x81)):
+            with contextlib.suppress(Stall):
+                assert len(device.control(one, data)) <= one.length
+        device.unplug()
 
 
 def test_setup_packets_by_the_table() -> None:

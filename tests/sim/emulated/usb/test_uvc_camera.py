@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import errno
+import threading
+from typing import Any
 
 import pytest
+from numpy.typing import NDArray
 
 from drivers.v4l2 import ioctl
 from instrument.config.camera import CameraDefects
 from sim.emulated.usb.device import Stall
+from sim.emulated.usb.uvc_camera import UvcCamera
 from sim.emulated.usb.uvc_controls import CONTROLS
 from sim.emulated.usb.uvc_descriptors import Probe, interval
-from sim.emulated.v4l2.device import Exposure
+from sim.emulated.v4l2.device import EmulatedCamera, Exposure
 from tests.support.usb.cameras import QUICK, RATES, Bench, imported_camera, render
 from tests.support.usb.uvc_host import UvcFrame, pixels
-from tests.support.v4l2.remote_camera import wait_for
+from tests.support.v4l2.remote_camera import DEADLINE_S, wait_for
 
 STEP_S = 1e-4
 Y16 = Probe(3, 1, interval(RATES[0]))
@@ -67,7 +71,7 @@ def test_a_fault_puts_another_format_in_its_place() -> None:
 
 
 def test_the_negotiated_rate_is_kept() -> None:
-    with imported_camera(frames_per_s=1000) as bench:
+    with imported_camera() as bench:
         for rate in RATES:
             bench.host.negotiate(Probe(3, 1, interval(rate)))
             assert bench.camera.frame_interval_s == pytest.approx(1 / rate, rel=1e-4)
@@ -134,10 +138,10 @@ def test_exposure_and_gain_reach_the_picture() -> None:
 
 def test_a_sensor_delay_shows_in_the_frames() -> None:
     """Of the frames after a change, exactly those in the pipeline have the exposure before it."""
-    with imported_camera(delay_frames=5, frames_per_s=100) as bench:
+    with imported_camera(delay_frames=5) as bench:
         bench.host.set("AE_MODE", MANUAL)
         bench.host.set("EXPOSURE_TIME_ABSOLUTE", 9)
-        bench.host.start(Y16)
+        bench.host.start(Y16._replace(frame_interval=interval(RATES[2])))
         bench.host.set("EXPOSURE_TIME_ABSOLUTE", 33)
         seen = exposures([bench.host.frame() for _ in range(10)])
         assert seen == sorted(seen)
@@ -207,6 +211,31 @@ def test_flagged_and_short_frames_are_marked_in_the_payloads() -> None:
         (False, whole // 2),
         (True, whole),
     ]
+
+
+def test_a_frame_begins_before_its_picture_is_rendered() -> None:
+    """Its first payload, by which uvcvideo stamps it, comes at the end of the exposure."""
+    rendering, finished = threading.Event(), threading.Event()
+
+    def render_slowly(exposure: Exposure, seen: object) -> NDArray[Any]:
+        rendering.set()
+        assert finished.wait(DEADLINE_S)
+        return render(exposure, seen)
+
+    with imported_camera() as bench:
+        bench.camera.render = render_slowly
+        bench.host.start(Y16)
+        assert len(bench.host.payload()) == 2
+        assert rendering.wait(DEADLINE_S)
+        finished.set()
+        assert len(bench.host.frame().data) == 64 * 48 * 2
+
+
+def test_rates_above_the_models_limit_are_refused() -> None:
+    camera = EmulatedCamera(render, capabilities=QUICK)
+    for rates in ((), (501, 100)):
+        with pytest.raises(ValueError, match="none above the model's 500/s"):
+            UvcCamera(camera, rates)
 
 
 def test_a_frozen_stream_gives_nothing_until_it_thaws() -> None:
