@@ -68,8 +68,8 @@ def agreement(result: FitResult, m: Measurements) -> Agreement:
     if min(by_runs, by_chi2) > SIGNIFICANCE:
         return Agreement(True, True, None, reason, ())
     rms, _ = rms_judged(result, m)
-    tested = least_runs_probability(m, residuals) < SIGNIFICANCE  # else they cannot but pass
-    if by_runs < _RANDOM or not tested or rms > MAX_RMS_RELATIVE or result.dof <= 0:
+    off = by_runs < _RANDOM or rms > MAX_RMS_RELATIVE or result.dof <= 0
+    if off or least_runs_probability(m, residuals) >= SIGNIFICANCE:  # they cannot but pass
         return Agreement(False, False, None, reason, ())
     scale = math.sqrt(result.chi2 / result.dof)
     return Agreement(True, False, scale, reason, (_u_too_small(scale, rms),))

@@ -45,6 +45,7 @@ class Covariance:
     variance: FloatArray
     common: Columns
     names: tuple[str, ...] = ()
+    _u: FloatArray = field(init=False, repr=False)
     _whitened: Columns = field(init=False, repr=False)
     _vectors: FloatArray = field(init=False, repr=False)
     _shrink: FloatArray = field(init=False, repr=False)
@@ -58,7 +59,8 @@ class Covariance:
         # In units of the independent errors C is 1 + V V^T, and with V^T V = W diag(s) W^T its
         # inverse root is 1 - V W diag((1 - 1 / sqrt(1 + s)) / s) W^T V^T. This gives the chi2 of
         # a Cholesky factor of C at a cost of K^3, without an N x N matrix.
-        V = _scaled(self.common, 1 / np.sqrt(self.variance))
+        object.__setattr__(self, "_u", np.sqrt(self.variance))
+        V = _scaled(self.common, 1 / self._u)
         s, W = np.linalg.eigh(_product(V.T, V))
         root = np.sqrt(1 + np.maximum(s, 0.0))
         object.__setattr__(self, "_whitened", V)
@@ -72,8 +74,7 @@ class Covariance:
 
         The result, of the same shape, is in units of u: residuals become independent with u = 1.
         """
-        scale = np.sqrt(self.variance)
-        return self._whiten_shared(x / (scale if x.ndim == 1 else scale[:, np.newaxis]))
+        return self._whiten_shared(x / (self._u if x.ndim == 1 else self._u[:, np.newaxis]))
 
     def _whiten_shared(self, y: FloatArray) -> FloatArray:
         """(1 + V V^T)^(-1/2) y, of y in units of the independent errors."""
@@ -102,7 +103,7 @@ class Covariance:
     @property
     def u_independent(self) -> FloatArray:
         """Independent part (N,) of each point's standard uncertainty, in the data's unit."""
-        return np.sqrt(self.variance)
+        return self._u
 
 
 def _scaled(columns: Columns, by: FloatArray) -> Columns:

@@ -56,10 +56,10 @@ def last_per_geometry(function: Callable[..., R]) -> Callable[..., R]:
     A fit evaluates a model and then its derivatives at the same parameters. As with
     `cached_per_geometry`, for geometries of up to two blocks.
     """
-    cache: WeakKeyDictionary[Geometry, tuple[tuple[float, ...], R]] = WeakKeyDictionary()
+    cache: WeakKeyDictionary[Geometry, tuple[tuple[object, ...], R]] = WeakKeyDictionary()
 
     @wraps(function)
-    def cached(geometry: Geometry, *parameters: float) -> R:
+    def cached(geometry: Geometry, *parameters: object) -> R:
         if geometry in cache and cache[geometry][0] == parameters:
             return cache[geometry][1]
         value = function(geometry, *parameters)

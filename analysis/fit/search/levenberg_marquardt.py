@@ -127,7 +127,8 @@ class _SecondDerivatives:
 
     def judge(self, gauss_newton: _Quadratic, step: FloatArray, gain: float) -> None:
         """Use, for the next step, the model which predicted the gain by the last one better."""
-        without, more = gauss_newton.decrease(step), float(step @ self.S @ step)
+        more = float(step @ self.S @ step)
+        without = gauss_newton.decrease(step) if more else 0.0
         self.used = more != 0 and abs(without - more - gain) < abs(without - gain)
 
     def update(self, old: _Quadratic, new: _Quadratic, r: FloatArray, huber: float | None) -> None:
@@ -151,12 +152,10 @@ class _SecondDerivatives:
         """The model with this Hessian, if it counts and leaves the model convex."""
         if not self.used:
             return model
-        effective = model.diagonal > _NO_EFFECT
-        size = np.sqrt(np.where(effective, model.diagonal, 1.0))
-        both = np.outer(effective, effective)
-        hessian = np.where(both, model.gauss_newton + self.S, model.gauss_newton)
-        convex = np.where(both, hessian / np.outer(size, size), np.eye(size.size))
-        if np.linalg.eigvalsh(convex)[0] < _CONVEX:
+        on = model.diagonal > _NO_EFFECT
+        hessian = model.gauss_newton + (self.S if on.all() else self.S * np.outer(on, on))
+        part, size = hessian[on][:, on], np.sqrt(model.diagonal[on])
+        if not on.any() or np.linalg.eigvalsh(part / size / size[:, np.newaxis])[0] < _CONVEX:
             return model
         return replace(model, hessian=hessian)
 
@@ -256,25 +255,24 @@ def _damped_step(model: _Quadratic, damping: float) -> FloatArray:
     The step goes from face to face of the box, always downhill: up to the first bound, which then
     stays fixed; at the minimum of a face, bounds that no longer block the descent are released.
     """
-    A = model.hessian + damping * np.diag(model.diagonal)
+    A = model.hessian + np.diag(damping * model.diagonal)
     down, up = model.low - model.x, model.high - model.x
-    step, free = np.zeros_like(model.x), model.free.copy()
-    if free.all():
-        whole = _solve_scaled(A, -model.gradient)
-        if (down < whole).all() and (whole < up).all():
-            return whole
+    step, free = np.zeros_like(model.x), model.free
     for _ in range(_MAX_FACES * step.size):
         step, hit = _step_in_face(A, model.gradient, step, free, down, up)
-        free &= ~hit
-        if np.any(hit):
+        free = free & ~hit
+        if hit.any():
             continue
+        at_low, at_high = step <= down, step >= up
+        if not (at_low | at_high).any():
+            break
         gradient = model.gradient + A @ step
         noise = _ROUNDING * (np.abs(model.gradient) + np.abs(A) @ np.abs(step))
-        released = ((step <= down) & (gradient < -noise)) | ((step >= up) & (gradient > noise))
+        released = (at_low & (gradient < -noise)) | (at_high & (gradient > noise))
         released &= model.diagonal > _NO_EFFECT
-        if not np.any(released):
+        if not released.any():
             break
-        free |= released
+        free = free | released
     return step
 
 
@@ -287,11 +285,10 @@ def _step_in_face(
     up: FloatArray,
 ) -> tuple[FloatArray, BoolArray]:
     """Extend the step to the minimum over the `free` parameters; mark a bound that is hit first."""
-    target = step.copy()
-    given = A[np.ix_(free, ~free)] @ step[~free]
-    target[free] = _solve_scaled(A[np.ix_(free, free)], -gradient[free] - given)
+    target, descent = step.copy(), -(gradient + A @ step)
+    target[free] += _solve_scaled(A[free][:, free], descent[free])
     over = (target < down) | (target > up)
-    if not np.any(over):
+    if not over.any():
         return target, over
     bound, part = np.where(target < step, down, up), np.ones_like(step)
     part[over] = ((bound - step)[over]) / ((target - step)[over])

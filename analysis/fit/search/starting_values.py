@@ -289,10 +289,7 @@ def _local_minima(chi2: FloatArray) -> BoolArray:
     """
     low = np.ones(chi2.shape, dtype=bool)
     for axis in range(chi2.ndim):
-        rise = np.diff(chi2, axis=axis)
-        edge = [(0, 0)] * chi2.ndim
-        edge[axis] = (0, 1)
-        low &= np.pad(rise >= 0, edge, constant_values=True)
-        edge[axis] = (1, 0)
-        low &= np.pad(rise <= 0, edge, constant_values=True)
+        along, lower = np.swapaxes(chi2, 0, axis), np.swapaxes(low, 0, axis)  # views
+        lower[:-1] &= along[:-1] <= along[1:]
+        lower[1:] &= along[1:] <= along[:-1]
     return low
