@@ -149,7 +149,8 @@ class Model:
     integral; None: `gradient` takes central differences. `validity_kernel`: None: the model is
     valid wherever it is defined. `in_blocks`: large arrays go through the kernel in blocks that
     stay in the processor's cache, which takes two thirds of the time; not for a kernel that caches
-    a whole set of geometries. `terms`: the models of a sum.
+    a whole set of geometries. `terms`: the models of a sum, or the parts of one model, each with
+    its own parameters.
     """
 
     name: str
@@ -244,6 +245,11 @@ def add(*models: Model) -> Model:
         in_blocks=all(model.in_blocks for model in models),
         terms=models,
     )
+
+
+def named_terms(model: Model) -> tuple[Model, ...]:
+    """Models of which this one is the sum by its name; alone if that names one."""
+    return model.terms if "+" in model.name else (model,)
 
 
 def _sum_brdf(models: Terms, geometry: Geometry, **parameters: float) -> FloatArray:

@@ -15,6 +15,7 @@ from functools import cache
 import numpy as np
 
 from analysis.models import MODELS, Model
+from analysis.models.base import named_terms
 from instrument.geometry import Geometry
 
 At = Mapping[str, float | str]
@@ -61,7 +62,7 @@ def special_cases(name: str) -> tuple[SpecialCase, ...]:
     """Special cases of the model or sum of that name, for single terms and for several at once."""
     model = MODELS[name]
     found: dict[tuple[object, ...], SpecialCase] = {}
-    for cases in itertools.product(*map(_cases, model.terms or (model,))):
+    for cases in itertools.product(*map(_cases, named_terms(model))):
         names = [case for case, _ in cases if case]
         at = _merged([at for _, at in cases])
         if at is None or not names or len(set(names)) < len(names) or "+".join(names) == name:

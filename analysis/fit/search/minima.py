@@ -47,10 +47,12 @@ def all_minima(
     """Minima of a problem from all starts, the deepest first; it and any as deep to the end.
 
     Starts are parameters (K,) in the model's units, `enough` is in units of u^2. The search ends
-    where several starts have led to the same minimum with a chi2 of `enough`.
+    where several starts have led to the same minimum with a chi2 of `enough`. MANY points that are
+    not explained get the search beside the minimum too, unless a level, which must follow each
+    step, makes it costly.
     """
     found = _rough_minima(problem, starts, enough)
-    if problem.brdf.size < MANY:
+    if problem.brdf.size < MANY or (found[0].chi2 > enough and not _has_level(problem)):
         beside = [_rough_minimum(problem, start) for start in _starts_beside(problem, found[0].x)]
         found = sorted([*found, *beside], key=_depth)
     done = [problem.solve(found[0].x)]
@@ -141,12 +143,16 @@ def _profile(problem: Problem, x: FloatArray, index: int, values: FloatArray) ->
         x = found.x
 
 
+def _has_level(problem: Problem) -> bool:
+    return any(p.level for p in problem.model.parameters)
+
+
 def _levelled(problem: Problem, x: FloatArray) -> FloatArray:
     """Start x (K,) with the level adjusted to the data, and the scales with it, shapes held."""
-    parameters = problem.model.parameters
-    if not any(p.level for p in parameters):
+    if not _has_level(problem):
         return x
-    shapes = [i for i, p in enumerate(parameters) if not (p.scale or p.level)]
+    parameters = enumerate(problem.model.parameters)
+    shapes = [i for i, p in parameters if not (p.scale or p.level)]
     return problem.solve(x, shapes, rtol=_LEVEL_RTOL).x
 
 

@@ -30,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.models.base import Model, Validity, last_per_geometry
+from analysis.models.base import Model, Validity
 from analysis.models.lambert import ALBEDO
 from analysis.models.rough.oren_nayar_forms import SIGMA_DEG
 from analysis.models.rough.single_slope import DirectionPairs, mean_over_azimuths
@@ -274,7 +274,6 @@ def _gauss(number: int) -> tuple[FloatArray, FloatArray]:
     return (x + 1) / 2, w / 2
 
 
-@last_per_geometry
 def _averages(
     geometry: Geometry, sigma: float, power: int, rule: Rule
 ) -> tuple[FloatArray, FloatArray]:

@@ -143,10 +143,26 @@ def mirror_angle(geometry: Geometry) -> FloatArray:
     return np.asarray(2 * np.arcsin(np.minimum(chord / 2, 1.0)))
 
 
+def _component(scale: Parameter, *width: Parameter) -> Model:
+    """One of the three components, as a model with its own parameters alone."""
+    without = {"diffuse": 0.0, "lobe": 0.0, "spike": 0.0}
+    widths = {p.name: p.default for p in (SIGMA_DEG, SPIKE_WIDTH_DEG)}
+
+    def kernel(geometry: Geometry, **parameters: float) -> FloatArray:
+        return unified_brdf(geometry, **{**without, **widths, **parameters})
+
+    return Model(f"{scale.name} of unified", (scale, *width), kernel)
+
+
 UNIFIED = Model(
     "unified",
     (DIFFUSE, LOBE, SIGMA_DEG, SPIKE, SPIKE_WIDTH_DEG),
     unified_brdf,
     unified_gradient,
     unified_validity,
+    terms=(
+        _component(DIFFUSE),
+        _component(LOBE, SIGMA_DEG),
+        _component(SPIKE, SPIKE_WIDTH_DEG),
+    ),
 )

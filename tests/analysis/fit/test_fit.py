@@ -145,6 +145,13 @@ def test_no_fit_is_above_the_truth_nor_above_a_special_case(slow: bool) -> None:
     assert not missed, missed
 
 
+def test_a_spike_between_the_points_of_a_dense_scan_is_found() -> None:
+    """Its width shows only where the rest of the model fits already, so on no grid."""
+    case = random_case(1118, ("unified",))
+    found = fit(case.model, case.measurements)
+    assert found.solved.chi2(found.x) <= found.solved.chi2(case.truth) * AS_LOW
+
+
 CURET = ROOT.parent / "shared" / "data" / "curet"
 
 COLUMNS = (
