@@ -20,8 +20,8 @@ from analysis.models.smooth.fresnel import (
 )
 from instrument.geometry import FloatArray, Geometry, IntArray
 
-# Angles up to which the distinct ones are searched for: a scan, and not a picture.
-_MOST_SEARCHED = 4096
+# Angles up to which the distinct ones are searched for: a scan, and not a block of a picture.
+_MOST_SEARCHED = 16_000
 
 
 @cached_per_geometry

@@ -86,10 +86,11 @@ def rays(mu: FloatArray, rho: float, n: float) -> Rays:
     """H, K and derivatives at cosines mu (N,) inside, dimensionless; by rho at 1: of 1 - 1e-12."""
     if mu.size <= _FEW_COSINES:
         return _rays_directly(mu, rho, n)
-    H, K = h_and_k(mu, rho, n)
-    by_rho, K_by_rho, by_log_mu, K_by_log_mu, K_by_n = _evaluate(_gradient_series(rho, n), mu, n)
+    both = np.concatenate([_series(rho, n), _gradient_series(rho, n)], axis=1)
+    log_H, K, by_rho, K_by_rho, by_log_mu, K_by_log_mu, K_by_n = _evaluate(both, mu, n)
     d_log_mu = (1 / (mu * mu) - 1) / n
-    return Rays(H, K, by_rho, K_by_rho, by_log_mu * d_log_mu, K_by_log_mu * d_log_mu + K_by_n)
+    by_n, K_along = by_log_mu * d_log_mu, K_by_log_mu * d_log_mu + K_by_n
+    return Rays(np.exp(log_H), K, by_rho, K_by_rho, by_n, K_along)
 
 
 def _h(mu: FloatArray, rho: float, order: int | None) -> FloatArray:
