@@ -1,9 +1,9 @@
 """Speed of the fit compared with lmfit, on the same model and data; values are checked first.
 
-Measured for 200 points on one core of 2 GHz, with starting values, uncertainties and criteria: the
-functional form 4 ms, the ladder without the exact model 90 ms (250 ms on a busy machine), an exact
-candidate 35 ms; lmfit, started at the true values and for the functional form alone,
-3 ms. The limits are ratios to lmfit.
+Measured for 200 points on a busy core of 2 GHz, with starting values, uncertainties and criteria:
+the functional form 3 ms, the ladder without the exact model 145 ms, all of its rungs, where nothing
+explains the data, 850 ms, an exact candidate 23 ms; lmfit, started at the true values and for the
+functional form alone, 1.2 ms. The limits are ratios to lmfit, or of one choice to another.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import lmfit
 import numpy as np
@@ -60,15 +61,16 @@ def test_the_functional_form_fits_as_with_lmfit_and_about_as_fast(scan: Measurem
     ratio = cpu_seconds(lambda: fit(MODELS["oren_nayar"], scan), 15) / cpu_seconds(
         lambda: by_lmfit(scan), 5
     )
-    assert ratio < 3
+    assert ratio < 3.5  # about 2.4
 
 
 def test_the_ladder_and_an_exact_candidate_cost_a_few_lmfit_fits(scan: Measurements) -> None:
     choice = choose(scan, method="functional")
     assert choice.chosen == "oren_nayar"
     ruler = cpu_seconds(lambda: by_lmfit(scan), 5)
-    # About 100: 14 candidates, each searched from all its minima. A guard, with room.
-    assert cpu_seconds(lambda: choose(scan, method="functional"), 3) < 150 * ruler
+    # About 125: 14 candidates, each searched from all its minima. A guard, with room.
+    ladder = cpu_seconds(lambda: choose(scan, method="functional"), 3)
+    assert ladder < 170 * ruler
     exact: list[FitResult] = []
 
     def fit_exact() -> None:
@@ -79,6 +81,11 @@ def test_the_ladder_and_an_exact_candidate_cost_a_few_lmfit_fits(scan: Measureme
 
     assert cpu_seconds(fit_exact, 2) < 100 * ruler
     assert exact[-1].converged
+    # About 6: 29 candidates, far from the data. 12 where searches crawl there.
+    wave = 1 + 0.05 * np.sin(np.radians(7 * scan.theta_r_deg) + scan.theta_i_deg)
+    unexplained = replace(scan, brdf=scan.brdf * wave)
+    assert choose(unexplained, method="functional").verdict == "none adequate"
+    assert cpu_seconds(lambda: choose(unexplained, method="functional"), 1) < 9 * ladder
 
 
 NUMBER = itertools.count()
