@@ -58,7 +58,7 @@ class AcmPort(UsbDevice):
     def send(self, data: bytes) -> None:
         """Send bytes to the program that has the port open; without one they are dropped."""
         cable = self.cable
-        if cable is not None and self.open:
+        if cable is not None:
             cable.send(DATA_IN, data, lambda: self.open)
 
     def unplug(self) -> None:

@@ -35,6 +35,7 @@ class UvcHost:
     def __init__(self, client: UsbIpClient) -> None:
         self.client = client
         self._urbs: deque[int] = deque()
+        self._last_ids: set[int] = set()
 
     # Controls
 
@@ -84,9 +85,9 @@ class UvcHost:
         sizes = [int.from_bytes(raw[i : i + 4], "little") for i in (18, 22)]
         return Probe(*Probe.parse(raw)[:3], *sizes)
 
-    def start(self, probe: Probe) -> Probe:
+    def start(self, probe: Probe, urbs: int = _URBS) -> Probe:
         chosen = self.negotiate(probe)
-        for _ in range(_URBS):
+        for _ in range(urbs):
             self._urbs.append(self.client.submit(VIDEO_ENDPOINT, PAYLOAD_BYTES))
         return chosen
 
@@ -95,18 +96,20 @@ class UvcHost:
         for urb in list(self._urbs):
             self.client.reply_to(self.client.unlink(urb))
         self._urbs.clear()
+        self._last_ids.clear()
         self.client.control_out(0x02, 1, 0, VIDEO_ENDPOINT)
 
-    def payload(self) -> bytes:
+    def payload(self, resubmit: bool = True) -> bytes:
         urb = self._urbs.popleft()
         done = self.client.reply_to(urb)
         assert isinstance(done, Submitted)
         assert done.status == 0
-        self._urbs.append(self.client.submit(VIDEO_ENDPOINT, PAYLOAD_BYTES))
+        if resubmit:
+            self._urbs.append(self.client.submit(VIDEO_ENDPOINT, PAYLOAD_BYTES))
         return done.data
 
     def frame(self) -> UvcFrame:
-        """Next frame from its first payload on; payloads of one frame share the frame id."""
+        """Next frame from its first payload on; its frame id is not that of the one before."""
         data, flags, ids = b"", 0, set()
         while not flags & END_OF_FRAME:
             payload = self.payload()
@@ -114,6 +117,8 @@ class UvcHost:
             flags |= payload[1]
             ids.add(payload[1] & FRAME_ID)
         assert len(ids) == 1
+        assert ids != self._last_ids
+        self._last_ids = ids
         return UvcFrame(data, flags)
 
 

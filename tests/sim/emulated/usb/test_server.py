@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import socket
 import threading
+import weakref
 from collections.abc import Callable
 
 import pytest
@@ -131,6 +133,15 @@ def test_nothing_is_left_behind() -> None:
             server.close()
         with pytest.raises(OSError, match="refused"), imported(server.port):
             pass
+
+
+def test_a_device_keeps_no_cable_that_was_pulled() -> None:
+    device = camera()
+    with UsbIpServer({"1-1": device}) as server, imported(server.port):
+        assert device.cable is not None
+        cable = weakref.ref(device.cable)
+    gc.collect()
+    assert cable() is None
 
 
 def test_computers_that_come_and_go_in_mid_stream() -> None:

@@ -85,6 +85,15 @@ def test_a_stream_ends_and_begins_again_as_uvcvideo_does_it() -> None:
             bench.host.stop()
 
 
+def test_a_stream_ends_in_the_middle_of_a_frame_that_nobody_takes_further() -> None:
+    with imported_camera() as bench:
+        bench.host.start(Y16, urbs=1)
+        assert len(bench.host.payload(resubmit=False)) == 2
+        bench.host.stop()
+        bench.host.start(Y16)
+        assert bench.host.frame().data
+
+
 def test_controls_have_the_ranges_of_the_model() -> None:
     with imported_camera(exposure_range=(20, 2047, 1)) as bench:
         known = bench.camera.controls()
@@ -229,6 +238,15 @@ def test_a_frame_begins_before_its_picture_is_rendered() -> None:
         assert rendering.wait(DEADLINE_S)
         finished.set()
         assert len(bench.host.frame().data) == 64 * 48 * 2
+
+
+def test_a_frame_that_would_get_too_late_a_stamp_is_lost() -> None:
+    """As on a machine that does not keep up: here the scene takes longer than the exposure."""
+    seen = iter((0.05, 0.05))
+    with imported_camera() as bench:
+        bench.camera.snapshot = lambda: threading.Event().wait(next(seen, 0.0))
+        bench.host.start(Y16)
+        assert pixels(bench.host.frame(), 64, 48, "Y16")[0, 2] >= 2
 
 
 def test_rates_above_the_models_limit_are_refused() -> None:
