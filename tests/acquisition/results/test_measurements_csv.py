@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -134,7 +134,8 @@ def test_the_table_holds_exactly_what_the_fit_takes(tmp_path: Path, slow: bool) 
 
 def plain(m: Measurements) -> dict[str, object]:
     """All values as lists; the groups of a shared error are numbers of their own."""
-    values = {name: getattr(m, name) for name in Measurements.__slots__ if name != "shared"}
+    given = [field.name for field in fields(Measurements) if field.init and field.name != "shared"]
+    values = {name: getattr(m, name) for name in given}
     lists = {n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in values.items()}
     errors = [(e.name, e.u_relative.tolist(), e.group.tolist()) for e in m.shared]
     return lists | {"shared": errors}
