@@ -15,7 +15,6 @@ from sim.emulated.usb.link import Link
 from sim.emulated.usb.usbip import ExportedDevice, ProtocolError
 
 _BUS = 1
-_RELEASE_S = 0.5  # an import waits so long for the one before it to end
 _log = logging.getLogger(__name__)
 
 
@@ -43,10 +42,14 @@ def exported(device: UsbDevice, busid: str, devnum: int) -> ExportedDevice:
 class UsbIpServer(Closeable):
     """Server on the loopback interface; `port` is its TCP port, chosen by the system if 0 is given.
 
-    devices: by busid, such as "1-1". A device that was unplugged can be imported again.
+    devices: by busid, such as "1-1". A device that was unplugged can be imported again. release_s:
+    time that an import waits for the one before it to end, as a computer detaches in its own time.
     """
 
-    def __init__(self, devices: Mapping[str, UsbDevice], port: int = 0) -> None:
+    def __init__(
+        self, devices: Mapping[str, UsbDevice], port: int = 0, release_s: float = 5.0
+    ) -> None:
+        self._release_s = release_s
         self._devices = dict(devices)
         self._exported = {
             busid: exported(device, busid, number)
@@ -55,6 +58,7 @@ class UsbIpServer(Closeable):
         self._links: dict[str, Link] = {}
         self._connections: dict[socket.socket, threading.Thread] = {}
         self._change = threading.Condition()
+        self._closing = False
         self._listener = socket.create_server(("127.0.0.1", port))
         self.port: int = self._listener.getsockname()[1]
         self._thread = threading.Thread(target=self._accept, daemon=True, name="usbip server")
@@ -67,6 +71,8 @@ class UsbIpServer(Closeable):
         self._thread.join()
         self._listener.close()
         with self._change:
+            self._closing = True
+            self._change.notify_all()
             ending = dict(self._connections)
             for connection in ending:
                 with contextlib.suppress(OSError):  # disconnected meanwhile
@@ -82,6 +88,12 @@ class UsbIpServer(Closeable):
             link.pull()
             with self._change:
                 self._change.wait_for(lambda: self._links.get(busid) is not link)
+
+    @property
+    def connections(self) -> int:
+        """Number of connected computers."""
+        with self._change:
+            return len(self._connections)
 
     def imported(self, busid: str) -> bool:
         """Return True while a computer has imported the device."""
@@ -133,7 +145,9 @@ class UsbIpServer(Closeable):
     def _claim(self, connection: socket.socket, busid: str) -> Link | None:
         """Return the link for a device; None if there is no such device or it stays in use."""
         with self._change:
-            self._change.wait_for(lambda: busid not in self._links, _RELEASE_S)
+            self._change.wait_for(
+                lambda: busid not in self._links or self._closing, self._release_s
+            )
             device = self._devices.get(busid)
             if busid in self._links or device is None or not device.present:
                 return None

@@ -49,15 +49,38 @@ def test_devices_are_listed_with_their_interfaces() -> None:
 
 
 def test_a_device_is_imported_once_at_a_time() -> None:
-    with UsbIpServer({"1-1": camera()}) as server:
-        with imported(server.port):
-            assert server.imported("1-1")
-            with pytest.raises(ProtocolError, match="status 1"), imported(server.port):
+    with UsbIpServer({"1-1": camera()}, release_s=0.05) as server, imported(server.port):
+        assert server.imported("1-1")
+        for busid in ("1-1", "1-9"):
+            with pytest.raises(ProtocolError, match="status 1"), imported(server.port, busid):
                 pass
-        with imported(server.port):  # free as soon as the first computer has disconnected
-            pass
-        with pytest.raises(ProtocolError, match="status 1"), imported(server.port, "1-9"):
-            pass
+
+
+def test_a_device_is_free_as_soon_as_the_computer_has_disconnected() -> None:
+    with UsbIpServer({"1-1": camera()}) as server:
+        for _ in range(5):
+            with imported(server.port):
+                pass
+
+
+def test_a_server_that_is_closed_keeps_nobody_waiting() -> None:
+    refused: list[Exception] = []
+
+    def wait() -> None:
+        try:
+            with imported(server.port):
+                pass
+        except (ProtocolError, EOFError, OSError) as error:
+            refused.append(error)
+
+    server = UsbIpServer({"1-1": camera()}, release_s=10 * DEADLINE_S)
+    with imported(server.port):
+        waiting = threading.Thread(target=wait)
+        waiting.start()
+        wait_for(lambda: server.connections == 2, "the second connection")
+        server.close()
+        waiting.join(DEADLINE_S)
+    assert len(refused) == 1
 
 
 def test_unplugged_in_mid_stream_and_imported_again_with_default_settings() -> None:
