@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 # Six workers need not each read the files that have no such test.
 WAITING = $(shell grep -rl --include='test_*.py' 'pytest\.mark\.waits' tests)
 
-.PHONY: demo test lint clean
+.PHONY: demo test hil-emulated lint clean
 
 demo: $(VENV)/.installed
 	$(BIN)/gonio run configs/protocols/demo.yaml
@@ -14,6 +14,10 @@ demo: $(VENV)/.installed
 test: $(VENV)/.installed-dev lint
 	$(BIN)/pytest -n auto --dist worksteal -m "not hil and not waits"
 	$(BIN)/pytest -n 6 -m "waits and not hil" $(WAITING)
+
+# The tests for a bench, in an emulated computer with real kernel drivers; OPTIONS="--slow" runs all.
+hil-emulated: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.hil_emulated $(OPTIONS)
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

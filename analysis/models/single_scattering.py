@@ -47,7 +47,7 @@ def single_scattering_gradient(
     g = asymmetry
     per_scattering = single_scattering_brdf(geometry, 1.0, g)
     _, base = _denominators(geometry, g)
-    growth = -2 * g / (1 - g * g) - 3 * (g + _cosines(geometry)[1]) / base
+    growth = -2 * g / (1 - g * g) - 3 * (g + _cos_gamma(geometry)) / base
     return {"scattering": per_scattering, "asymmetry": scattering * per_scattering * growth}
 
 
@@ -63,16 +63,15 @@ def single_scattering_validity(geometry: Geometry, scattering: float, asymmetry:
 
 def _denominators(geometry: Geometry, g: float) -> tuple[FloatArray, FloatArray]:
     """cos_i + cos_r, and 1 + g^2 + 2 g cos(gamma)."""
-    cos_sum, cos_gamma = _cosines(geometry)
-    return cos_sum, np.asarray(1 + g * g + 2 * g * cos_gamma)
+    cos_sum = np.cos(geometry.theta_i) + np.cos(geometry.theta_r)
+    return cos_sum, np.asarray(1 + g * g + 2 * g * _cos_gamma(geometry))
 
 
 @cached_per_geometry
-def _cosines(geometry: Geometry) -> tuple[FloatArray, ...]:
-    """cos_i + cos_r, and the cosine of the angle between the directions to lamp and camera."""
-    cos_i, cos_r = np.cos(geometry.theta_i), np.cos(geometry.theta_r)
+def _cos_gamma(geometry: Geometry) -> FloatArray:
+    """Cosine of the angle between the directions to the lamp and to the camera."""
     across = np.sin(geometry.theta_i) * np.sin(geometry.theta_r) * geometry.cos_dphi
-    return cos_i + cos_r, cos_i * cos_r + across
+    return np.asarray(np.cos(geometry.theta_i) * np.cos(geometry.theta_r) + across)
 
 
 SINGLE_SCATTERING = Model(

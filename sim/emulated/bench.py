@@ -64,7 +64,7 @@ class EmulatedBench:
 
     def __init__(self, scene: Scene, clock: Clock) -> None:
         self._scene, self._clock = scene, clock
-        self._motors: dict[str, Motor] = {}
+        self.motors: dict[str, Motor] = {}
         self._closing = ExitStack()
 
     def close(self) -> None:
@@ -72,7 +72,11 @@ class EmulatedBench:
         self._closing.close()
 
     def plug_axis(self, name: str, axis: Wired) -> str:
-        """Connect the controller of an axis; return the port for its driver."""
+        """Connect the controller of an axis to a port of its own; return the port."""
+        return self._closing.enter_context(PtyWire([self.controller(name, axis)])).port
+
+    def controller(self, name: str, axis: Wired) -> Controller:
+        """Return the controller of an axis, with its motor; the scene follows the motor."""
         low, high = axis.device_limits_deg()
         mechanics = Mechanics(
             min_deg=low - _LIMIT_MARGIN_DEG,
@@ -82,13 +86,17 @@ class EmulatedBench:
             home_deg=axis.to_device_deg(axis.home_deg),
             homing_s=axis.homing_s / 2,
         )
-        motor = Motor(mechanics, self._clock)
-        wire = self._closing.enter_context(PtyWire([_controller(axis, motor)]))
-        self._motors[name] = motor
-        return wire.port
+        motor = self.motors[name] = Motor(mechanics, self._clock)
+        return _controller(axis, motor)
 
     def plug_camera(self, camera: V4l2CameraConfig) -> str:
         """Connect the camera; return the device path for its driver."""
+        device = self.camera(camera)
+        self._closing.enter_context(V4l2Server(device, Path(os.environ[_SOCKET])))
+        return CAMERA_DEVICE
+
+    def camera(self, camera: V4l2CameraConfig) -> EmulatedCamera:
+        """Return the camera, which takes pictures of the scene."""
         self._scene.mottling()  # computed once, shared by all snapshots
         sensor, lock = Sensor(self._scene), threading.Lock()
 
@@ -99,14 +107,12 @@ class EmulatedBench:
                 return sensor.picture(exposure.exposure_s)
 
         capabilities = _capabilities(camera, self._scene.rig.simulation.camera_defects)
-        device = EmulatedCamera(render, self._snapshot, capabilities)
-        self._closing.enter_context(V4l2Server(device, Path(os.environ[_SOCKET])))
-        return CAMERA_DEVICE
+        return EmulatedCamera(render, self._snapshot, capabilities)
 
     def _snapshot(self) -> Scene:
         """Copy of the scene at the start of an exposure, with the motors' present angles."""
         scene = self._scene
-        for name, motor in self._motors.items():
+        for name, motor in self.motors.items():
             scene.set_axis(name, scene.rig.axes[name].from_device_deg(motor.position_deg))
         return replace(scene, true_deg=dict(scene.true_deg))
 

@@ -11,7 +11,7 @@ from instrument.config.load import Loaded
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 from tests.support.scans import small_scan, undated
-from tests.support.stopped_scan import scan
+from tests.support.whole_scans.stopped_scan import scan
 
 
 @pytest.fixture(scope="package")

@@ -10,7 +10,13 @@ import pytest
 
 from instrument.config.protocol import SimulatedSample
 from instrument.geometry import FloatArray
-from tests.support.coverage_scans import BANDS_DEG, Deviations, deviations, drawn_scan, measured
+from tests.support.whole_scans.coverage_scans import (
+    BANDS_DEG,
+    Deviations,
+    deviations,
+    drawn_scan,
+    measured,
+)
 
 SAMPLES = {
     "matt": ("oren_nayar", {"sigma_deg": 30.0}),

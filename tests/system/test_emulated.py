@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import re
@@ -20,6 +19,7 @@ import yaml
 from tests.support.command import gonio, gonio_here
 from tests.support.paths import CONFIGS, ROOT
 from tests.support.scans import small_demo
+from tests.support.whole_scans.simulated_rig import assert_same_within_noise, points, simulated
 
 pytestmark = [
     pytest.mark.real_time,
@@ -61,34 +61,7 @@ def test_each_point_agrees_with_the_simulated_rig(
     simulated_rig.write_text(simulated(RIG.read_text()))
     done = gonio_here("run", protocol, "--rig", simulated_rig, "--out", tmp_path / "run")
     assert done.returncode == 0, done.stderr
-    first, second = points(run), points(tmp_path / "run")
-    assert first.keys() == second.keys()
-    deviations = [(f - g) / (u**2 + v**2) ** 0.5 for (f, u), (g, v) in
-                  ((first[k], second[k]) for k in first)]  # fmt: skip
-    assert max(map(abs, deviations)) < 4.5
-    assert sum(d * d for d in deviations) / len(deviations) < 1.5
-
-
-def simulated(text: str) -> str:
-    """The emulated rig's file with simulated devices in place of drivers."""
-    rig = yaml.safe_load(text)
-    for axis in rig["axes"].values():
-        for key in ("port", "model", "parity", "steps_per_deg", "microsteps_per_deg"):
-            axis.pop(key, None)
-        axis["driver"] = "simulated"
-    for key in ("device", "pixel_format", "exposure_delay_frames", "frames_per_s"):
-        rig["camera"].pop(key)
-    rig["camera"]["driver"] = "simulated"
-    return str(yaml.safe_dump(rig))
-
-
-def points(folder: Path) -> dict[tuple[float, ...], tuple[float, float]]:
-    with (folder / "measurements.csv").open() as file:
-        return {
-            tuple(float(row[k]) for k in ("theta_i_deg", "dphi_deg", "theta_r_deg")):
-            (float(row["brdf"]), float(row["u_brdf"]))
-            for row in csv.DictReader(file)
-        }  # fmt: skip
+    assert_same_within_noise(points(run), points(tmp_path / "run"))
 
 
 def test_the_record_holds_the_devices_identities_and_the_frames_times(run: Path) -> None:

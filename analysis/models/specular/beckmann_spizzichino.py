@@ -19,13 +19,7 @@ import math
 
 import numpy as np
 
-from analysis.models.base import (
-    Model,
-    Parameter,
-    Validity,
-    cached_per_geometry,
-    last_per_geometry,
-)
+from analysis.models.base import Model, Parameter, Validity, last_per_geometry
 from analysis.models.specular.poisson_sums import Terms, poisson_terms, summed
 from analysis.models.specular.surface_statistics import (
     check_lengths,
@@ -199,14 +193,9 @@ def lobe_exponent(geometry: Geometry, correlation_length: float) -> FloatArray:
 
 def lobe_factor(geometry: Geometry, correlation_length: float) -> FloatArray:
     """(cosθ_i/cosθ_r) π T² D² in 1/sr, of the geometry's shape: the factor before the sum."""
-    return math.pi * correlation_length**2 * _factor_of_angles(geometry)
-
-
-@cached_per_geometry
-def _factor_of_angles(geometry: Geometry) -> FloatArray:
-    """(cosθ_i/cosθ_r) D²."""
     ratio = np.cos(geometry.theta_i) / np.cos(geometry.theta_r)
-    return np.asarray(ratio * np.square(geometric_factor(geometry)))
+    D = geometric_factor(geometry)
+    return math.pi * correlation_length**2 * ratio * np.square(D)
 
 
 def _coherent(

@@ -44,14 +44,14 @@ def ggx_brdf(geometry: Geometry, f0: float, alpha: float) -> FloatArray:
 
 def ggx_gradient(geometry: Geometry, f0: float, alpha: float) -> dict[str, FloatArray]:
     """Derivatives of `ggx_brdf` by f0 and by alpha. As in `Model.gradient`."""
-    cos2_a, _, schlick = _half_vector(geometry)
-    D, visibility = _factors(geometry, alpha)
-    c_i, c_r, sin2_i, sin2_r = _cosines(geometry)
-    q_i, q_r = _q(geometry, alpha)
+    cos2_a, cos_half, D, visibility = _factors(geometry, alpha)
+    schlick = np.power(1 - cos_half, 5)
+    c_i, c_r = np.cos(geometry.theta_i), np.cos(geometry.theta_r)
+    q_i, q_r = _q(geometry.theta_i, alpha), _q(geometry.theta_r, alpha)
     # dq/dalpha = alpha sin^2/q; D = alpha^2/(pi w^2), so w = alpha/sqrt(pi D).
-    by_alpha = c_i * sin2_r / q_r + c_r * sin2_i / q_i
+    dq_i, dq_r = (alpha * np.sin(t) ** 2 for t in (geometry.theta_i, geometry.theta_r))
+    log_visibility = -(c_i * dq_r / q_r + c_r * dq_i / q_i) * 2 * visibility
     log_D = 2 / alpha - 4 * cos2_a * np.sqrt(np.pi * D)
-    log_visibility = -2 * alpha * by_alpha * visibility
     F = f0 + (1 - f0) * schlick
     return {
         "f0": np.asarray((1 - schlick) * D * visibility),
@@ -65,8 +65,8 @@ def ggx_f90_brdf(geometry: Geometry, f0: float, f90: float, alpha: float) -> Flo
     Arguments and result as in `Model.brdf`. f0 and f90 are the lobe's strengths at normal incidence
     and at grazing. Above 1 more light may leave than arrives. Never negative; reciprocal.
     """
-    D, visibility = _factors(geometry, alpha)
-    F = f0 + (f90 - f0) * _half_vector(geometry)[2]
+    _, cos_half, D, visibility = _factors(geometry, alpha)
+    F = f0 + (f90 - f0) * np.power(1 - cos_half, 5)
     return np.asarray(F * D * visibility)
 
 
@@ -75,8 +75,8 @@ def ggx_f90_gradient(
 ) -> dict[str, FloatArray]:
     """Derivatives of `ggx_f90_brdf` by f0, f90 and alpha. As in `Model.gradient`."""
     mirrors = ggx_gradient(geometry, 1.0, alpha)["alpha"]  # of facets that reflect all light
-    D, visibility = _factors(geometry, alpha)
-    schlick = _half_vector(geometry)[2]
+    _, cos_half, D, visibility = _factors(geometry, alpha)
+    schlick = np.power(1 - cos_half, 5)
     return {
         "f0": np.asarray((1 - schlick) * D * visibility),
         "f90": np.asarray(schlick * D * visibility),
@@ -94,37 +94,29 @@ def ggx_f90_validity(geometry: Geometry, f0: float, f90: float, alpha: float) ->
     )
 
 
-def _factors(geometry: Geometry, alpha: float) -> tuple[FloatArray, FloatArray]:
-    """D in 1/sr, and G2/(4 cos_i cos_r)."""
-    cos2_a, sin2_a, _ = _half_vector(geometry)
+def _factors(
+    geometry: Geometry, alpha: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """cos^2(theta_a), cos(theta'), D in 1/sr, and G2/(4 cos_i cos_r)."""
+    cos2_a, sin2_a, cos_half = _half_vector(geometry)
     D = np.square(alpha / (alpha * alpha * cos2_a + sin2_a)) / np.pi
-    c_i, c_r, *_ = _cosines(geometry)
-    q_i, q_r = _q(geometry, alpha)
-    return D, 0.5 / (c_i * q_r + c_r * q_i)
-
-
-def _q(geometry: Geometry, alpha: float) -> tuple[FloatArray, FloatArray]:
-    """sqrt(cos^2 + alpha^2 sin^2) of lamp and camera."""
-    c_i, c_r, sin2_i, sin2_r = _cosines(geometry)
-    alpha2 = alpha * alpha
-    return np.sqrt(c_i * c_i + alpha2 * sin2_i), np.sqrt(c_r * c_r + alpha2 * sin2_r)
+    c_i, c_r = np.cos(geometry.theta_i), np.cos(geometry.theta_r)
+    q_i, q_r = _q(geometry.theta_i, alpha), _q(geometry.theta_r, alpha)
+    return cos2_a, cos_half, D, 0.5 / (c_i * q_r + c_r * q_i)
 
 
 @cached_per_geometry
 def _half_vector(geometry: Geometry) -> tuple[FloatArray, ...]:
-    """cos^2(theta_a), sin^2(theta_a) and (1 - cos(theta'))^5."""
+    """cos^2(theta_a), sin^2(theta_a) and cos(theta')."""
     across2 = tangential_squared(geometry)
     along2 = np.square(np.cos(geometry.theta_i) + np.cos(geometry.theta_r))
     length2 = across2 + along2
     cos_half = np.minimum(np.sqrt(length2) / 2, 1.0)
-    return along2 / length2, across2 / length2, np.power(1 - cos_half, 5)
+    return along2 / length2, across2 / length2, cos_half
 
 
-@cached_per_geometry
-def _cosines(geometry: Geometry) -> tuple[FloatArray, ...]:
-    """cos(theta_i), cos(theta_r), sin^2(theta_i) and sin^2(theta_r)."""
-    theta = geometry.theta_i, geometry.theta_r
-    return *map(np.cos, theta), *(np.square(np.sin(t)) for t in theta)
+def _q(theta: FloatArray, alpha: float) -> FloatArray:
+    return np.asarray(np.sqrt(np.square(np.cos(theta)) + np.square(alpha * np.sin(theta))))
 
 
 GGX = Model("ggx", (F0, ALPHA), ggx_brdf, ggx_gradient, valid_unless_both_graze)

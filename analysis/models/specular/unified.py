@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from analysis.models.base import Model, Parameter, Validity, cached_per_geometry
+from analysis.models.base import Model, Parameter, Validity
 from analysis.models.specular.torrance_sparrow import SIGMA_DEG, half_vector, tangential_squared
 from analysis.models.validity import either_grazes, valid_except
 from instrument.geometry import FloatArray, Geometry
@@ -133,7 +133,6 @@ def spike_shape(geometry: Geometry, spike_width_deg: float) -> FloatArray:
     return np.exp(-0.5 * np.square(mirror_angle(geometry) / w)) / (2 * math.pi * w**2)
 
 
-@cached_per_geometry
 def mirror_angle(geometry: Geometry) -> FloatArray:
     """δ in radians, 0 to π: angle from the lamp's mirror direction to the camera.
 

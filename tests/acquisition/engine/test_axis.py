@@ -12,7 +12,7 @@ from instrument.config.load import Loaded
 from instrument.errors import DeviceError
 from instrument.record.record import Record
 from tests.support.stand_ins import PassThrough
-from tests.support.stopped_scan import scan
+from tests.support.whole_scans.stopped_scan import scan
 
 
 class Slipping(PassThrough):

@@ -12,7 +12,7 @@ from instrument.record.record import Record
 from tests.support.paths import CONFIGS
 from tests.support.scans import changed, small_scan
 from tests.support.stand_ins import Spy
-from tests.support.stopped_scan import scan
+from tests.support.whole_scans.stopped_scan import scan
 
 
 def test_a_dark_is_taken_at_every_exposure_used(small: Loaded, record: Record) -> None:

@@ -25,7 +25,7 @@ from instrument.errors import DeviceError
 from instrument.record.record import Record
 from sim.clock import SimulatedClock
 from tests.support.scans import changed, small_scan, undated
-from tests.support.stopped_scan import scan
+from tests.support.whole_scans.stopped_scan import scan
 
 GREY = 0.18
 CAMERA = small_scan().rig.camera

@@ -13,7 +13,7 @@ from acquisition.plan.plan import make_plan
 from instrument.errors import InputError
 from instrument.record.record import Record
 from tests.support.scans import changed, small_scan
-from tests.support.stopped_scan import scan
+from tests.support.whole_scans.stopped_scan import scan
 
 LOADED = changed(small_scan(), keep_frames=True)
 

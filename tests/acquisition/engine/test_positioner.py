@@ -14,7 +14,7 @@ from instrument.record.reading import Reading
 from instrument.record.record import Record
 from tests.support.scans import undated
 from tests.support.stand_ins import PassThrough, Spy
-from tests.support.stopped_scan import scan
+from tests.support.whole_scans.stopped_scan import scan
 
 
 class Mute(PassThrough):

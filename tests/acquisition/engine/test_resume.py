@@ -11,7 +11,7 @@ from instrument.config.load import Loaded
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 from tests.support.scans import changed, small_scan, undated
-from tests.support.stopped_scan import scan
+from tests.support.whole_scans.stopped_scan import scan
 
 
 def test_cut_after_any_step_the_rest_is_the_same_to_the_last_digit(

@@ -13,7 +13,7 @@ from acquisition.measure.drift import Drift, is_usable, rate
 from instrument.record.reading import Check, Reading
 from instrument.record.record import Record
 from tests.support.scans import small_scan
-from tests.support.stopped_scan import scan
+from tests.support.whole_scans.stopped_scan import scan
 
 
 def check(step: int, time_s: float, signal_dn: float, flags: str = "") -> Reading:

@@ -21,7 +21,7 @@ from instrument.devices import Frame
 from instrument.pinhole import Pinhole
 from instrument.record.record import Record
 from tests.support.scans import changed, small_scan
-from tests.support.stopped_scan import scan
+from tests.support.whole_scans.stopped_scan import scan
 
 SMALL = small_scan()
 CAMERA = SMALL.rig.camera

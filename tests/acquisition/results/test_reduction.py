@@ -13,7 +13,7 @@ from instrument.config.load import Loaded
 from instrument.record.reading import Check, Reading
 from instrument.record.record import Record
 from tests.support.scans import changed, small_scan
-from tests.support.stopped_scan import scan
+from tests.support.whole_scans.stopped_scan import scan
 
 
 @pytest.fixture(scope="module")

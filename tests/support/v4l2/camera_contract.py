@@ -136,7 +136,10 @@ def check_saturation(camera: Camera, config: CameraConfig) -> None:
         if plateau > 0.01 or longer_s == exposure_s:
             break
         exposure_s = longer_s
-    assert plateau > 0.01, "nothing saturates at the longest exposure: more light is needed"
+    assert plateau > 0.01, (
+        f"nothing saturates at the longest exposure, {exposure_s:g} s: {brightest} counts at "
+        "most, more light is needed"
+    )
     assert brightest >= SATURATION_FRACTION * config.max_dn, (
         f"an overexposed image stays at {brightest} of {config.max_dn} counts: bit_depth or "
         "luma_range of the rig file is wrong"

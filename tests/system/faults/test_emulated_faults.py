@@ -31,9 +31,9 @@ from sim.faults.faults import Faults
 from sim.faults.triggers import Triggers, When
 from sim.scene.scene import Scene
 from tests.support import faulty_scan
-from tests.support.faulty_scan import ScanResult, WatchedDevice, require_reported
 from tests.support.scans import changed, small_scan
 from tests.support.stages.emulated_stages import EMULATED_STAGES, EmulatedStage
+from tests.support.whole_scans.faulty_scan import ScanResult, WatchedDevice, require_reported
 
 pytestmark = pytest.mark.waits
 

@@ -26,7 +26,7 @@ from tests.support.stages.kinds import controller_for, open_stage
 from tests.support.stages.plug import EventfulClock, Plug
 from tests.support.stages.waiting import wait_until
 from tests.support.stand_ins import PassThrough
-from tests.support.stopped_scan import scan
+from tests.support.whole_scans.stopped_scan import scan
 
 pytestmark = pytest.mark.waits
 

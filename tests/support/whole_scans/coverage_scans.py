@@ -33,7 +33,7 @@ from sim.scene.operator import SimulatedOperator
 from sim.scene.render import electrons_per_s
 from tests.support.paths import CONFIGS
 from tests.support.scans import changed, exact_rig, simulated_scene
-from tests.support.stopped_scan import scan
+from tests.support.whole_scans.stopped_scan import scan
 
 BANDS_DEG = ((0.0, 30.0), (30.0, 60.0), (60.0, 75.0), (75.0, 85.0))
 _RINGS = 4  # of the truth's average over lamp and lens

@@ -1,0 +1,1 @@
+"""Whole scans for tests: faulty ones, stopped ones, many draws of one, and their points."""
