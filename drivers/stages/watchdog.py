@@ -76,9 +76,11 @@ class Watchdog:
         self._over.set()
 
     def poll(self, read_status: Callable[[], T]) -> T:
-        """Return the status; an answer restarts the time allowed."""
+        """Return the status; an answer restarts the time allowed, unless a pause has used it up."""
         with self._asking:
             status = read_status()
+            if self._meter.paused_since_s(self._answered_s):
+                self.check()  # the thread may wake later than the caller
             self._answered_s = self._clock.now_s()
             return status
 

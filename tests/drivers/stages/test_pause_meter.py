@@ -159,6 +159,20 @@ def test_a_pause_is_named_also_if_the_watchdogs_thread_wakes_last(
     assert setup.moves_on()
 
 
+def test_a_pause_is_named_also_if_the_status_comes_before_the_watchdogs_thread(
+    setup: Setup, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(setup.stage.watchdog, "_watch", lambda over: over.wait(5))
+    setup.stage.start_move(70.0)
+    wait_until(lambda: setup.motor.position_deg > 1.0)
+    setup.clock.pause()
+    with pytest.raises(ComputerPaused, match=r"theta_r: the computer paused for 1.3 s"):
+        setup.stage.wait()
+    wait_until(lambda: not setup.motor.moving)
+    monkeypatch.undo()
+    assert setup.moves_on()
+
+
 @pytest.mark.parametrize("setup", ["newport"], indirect=True)
 def test_the_watchdogs_stop_does_not_end_the_next_move(
     setup: Setup, monkeypatch: pytest.MonkeyPatch
