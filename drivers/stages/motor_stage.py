@@ -334,7 +334,7 @@ class MotorStage(ABC):
 
     def _repeat_stop(self) -> None:
         """Repeat a stop that came while a command was being sent, and raise `Stopped`."""
-        self.watchdog.check()  # its own thread may wake later than this one
+        self.watchdog.check_for_pause()
         if self._stopped:
             self._send_stop()
             self._raise_if_unwatched()

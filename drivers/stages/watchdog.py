@@ -79,10 +79,17 @@ class Watchdog:
         """Return the status; an answer restarts the time allowed, unless a pause has used it up."""
         with self._asking:
             status = read_status()
-            if self._meter.paused_since_s(self._answered_s):
-                self.check()  # the thread may wake later than the caller
+            self.check_for_pause()
             self._answered_s = self._clock.now_s()
             return status
+
+    def check_for_pause(self) -> None:
+        """Stop the motion, once, if a pause of the computer has used up the time allowed.
+
+        The thread may wake later than the caller, who has an answer by then.
+        """
+        if self._meter.paused_since_s(self._answered_s):
+            self.check()
 
     def check(self) -> None:
         """Stop the motion, once, if the time allowed is up."""
