@@ -52,11 +52,12 @@ class PausedInACommand:
 
     def __init__(self, controller: Controller, clock: PausingClock) -> None:
         self._controller, self._clock = controller, clock
-        self.command, self.noted, self.lost = b"-", threading.Event(), False
+        self.command: bytes | None = None
+        self.noted, self.lost = threading.Event(), False
 
     def answer(self, data: bytes) -> bytes:
-        if self.command in data:
-            self.command = b"-"
+        if self.command and self.command in data:
+            self.command = None
             self._clock.pause()
             assert self.noted.wait(5)
             answer = self._controller.answer(data)
