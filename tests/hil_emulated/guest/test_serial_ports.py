@@ -152,8 +152,8 @@ def test_even_parity_is_set_at_the_port(opened: Opened) -> None:
 def test_a_pause_of_the_program_is_named_and_the_stage_moves_on(name: str, bench: Bench) -> None:
     """With the usual time for an answer, a status may be 0.5 s old while the stage moves."""
     place = PLACES[name]
-    quick = replace(place, axis=place.axis.model_copy(update={"reply_s": REPLY_S}))
-    with opened_at(quick, bench) as opened:
+    changes = {"reply_s": REPLY_S, "speed_deg_per_s": 10.0}
+    with opened_at(replace(place, axis=place.axis.model_copy(update=changes)), bench) as opened:
         opened.start_long_move()
         with paused(0.9), pytest.raises(ComputerPaused, match="the computer paused for"):
             opened.stage.wait()
