@@ -28,6 +28,7 @@ _PACKAGES = {  # Debian's names
     "qemu-system-x86_64": "qemu-system-x86", "busybox": "busybox-static", "cpio": "cpio",
     "udevadm": "udev", "kmod": "kmod",
 }  # fmt: skip
+_PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 _UDEVD = "/lib/systemd/systemd-udevd"
 _TESTS = ("tests/drivers/test_camera_contract.py", "tests/drivers/test_stage_contract.py",
           "tests/hil_emulated/guest")  # fmt: skip
@@ -37,15 +38,25 @@ _LIMIT_S = 1500.0
 def main() -> int:
     """Return pytest's exit code, 0 if the machine lacks something, 70 if the guest crashed."""
     kernel = installed_kernel()
-    lacking = [p for tool, p in _PACKAGES.items() if shutil.which(tool) is None]
-    if kernel is None:
-        lacking.append("linux-image-amd64")
+    lacking = _lacking(kernel)
     if lacking or kernel is None:
-        _say(f"skipped: not installed (Debian: {' '.join(lacking)})")
+        _say(f"skipped: {lacking}")
         return 0
     _say(f"Linux {kernel.version}")
     with tempfile.TemporaryDirectory() as folder:
         return _run(kernel, Path(folder), sys.argv[1:])
+
+
+def _lacking(kernel: Kernel | None) -> str:
+    """Return what this machine lacks, in words; empty if it has all."""
+    packages = [package for tool, package in _PACKAGES.items() if shutil.which(tool) is None]
+    if kernel is None:
+        packages.append("linux-image-amd64")
+    if packages:
+        return f"not installed (Debian: {' '.join(packages)})"
+    if kernel is not None and not os.access(kernel.image, os.R_OK):
+        return f"{kernel.image} may not be read: run it as root"
+    return ""
 
 
 def _run(kernel: Kernel, folder: Path, options: list[str]) -> int:
@@ -83,7 +94,7 @@ def _start(options: list[str], calls: int, usb: int) -> str:
         "--rig", str(_HERE / "rig.yaml"), *rest, *(paths or _TESTS),
     ]  # fmt: skip
     variables = {
-        "PATH": os.environ["PATH"], "HOME": "/root", "LANG": "C.UTF-8",
+        "PATH": _PATH, "HOME": "/root", "LANG": "C.UTF-8",
         "SYSTEMD_IGNORE_CHROOT": "1", "PYTHONDONTWRITEBYTECODE": "1",
         "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
         ADDRESS: f"{HOST}:{calls}", USB: f"{HOST}:{usb}",

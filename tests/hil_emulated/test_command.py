@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 
 import pytest
 
 from tests.hil_emulated import __main__ as command
+from tests.hil_emulated.host.kernel import Kernel
 
 
 @pytest.mark.parametrize("lacking", ["qemu-system-x86_64", "cpio", "linux-image"])
@@ -21,6 +23,17 @@ def test_what_the_machine_lacks_is_named_in_one_line_and_nothing_boots(
     (line,) = capsys.readouterr().out.splitlines()
     assert line.startswith("emulated computer: skipped: not installed (Debian: ")
     assert lacking.removesuffix("_64") in line
+
+
+def test_a_kernel_that_may_not_be_read_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As for users other than root on some distributions."""
+    image = tmp_path / "vmlinuz-6.1.0"
+    monkeypatch.setattr(command, "installed_kernel", lambda: Kernel("6.1.0", image, tmp_path))
+    monkeypatch.setattr(shutil, "which", lambda tool: f"/{tool}")
+    assert command.main() == 0
+    assert f"skipped: {image} may not be read: run it as root" in capsys.readouterr().out
 
 
 def test_the_guest_runs_the_tests_for_a_bench_and_leaves_their_exit_code() -> None:
