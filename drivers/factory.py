@@ -9,6 +9,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, assert_never
 
+from drivers.lines.device_lock import DeviceLock
 from drivers.lines.serial_line import Line
 from drivers.stages.motion import Limits
 from drivers.stages.motor_stage import MotorStage
@@ -42,8 +43,12 @@ class Lines(Closeable):
     ) -> Line:
         """Return the line of a serial port; the first call opens it."""
         if port not in self._serial:
-            line = Line(who, port, baudrate, self.clock, xonxoff, reply_s)
-            self._serial[port] = self._closing.enter_context(line)
+            with self._locked(who, port) as opening:
+                line = opening.enter_context(
+                    Line(who, port, baudrate, self.clock, xonxoff, reply_s)
+                )
+                self._closing.push(opening.pop_all())
+            self._serial[port] = line
         return self._serial[port]
 
     def modbus(self, who: str, settings: BusSettings) -> ModbusBus:
@@ -51,9 +56,18 @@ class Lines(Closeable):
         from drivers.lines.modbus_bus import ModbusBus
 
         if settings.port not in self._modbus:
-            bus = ModbusBus(who, settings, self.clock)
-            self._modbus[settings.port] = self._closing.enter_context(bus)
+            with self._locked(who, settings.port) as opening:
+                bus = opening.enter_context(ModbusBus(who, settings, self.clock))
+                self._closing.push(opening.pop_all())
+            self._modbus[settings.port] = bus
         return self._modbus[settings.port]
+
+    @staticmethod
+    def _locked(who: str, port: str) -> ExitStack:
+        """Return a stack that holds the lock of a port, and ends it if the port does not open."""
+        opening = ExitStack()
+        opening.enter_context(DeviceLock(who, port))
+        return opening
 
 
 def open_stage(name: str, axis: Wired, port: str, lines: Lines) -> MotorStage:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, wait
 from typing import TypeVar
 
+from drivers.lines.device_lock import DeviceLock
 from drivers.v4l2 import ioctl
 from drivers.v4l2.capture import Traits
 from drivers.v4l2.open_device import CHECK_USB, camera_lost
@@ -47,6 +48,7 @@ class V4l2Camera(Closeable):
         self._traits: Traits | None = None
         self._capability: ioctl.Capability | None = None
         self._closed = False
+        self._lock = DeviceLock("camera", settings.device)
         self._rounded: set[int] = set()
         self._worker = WorkerThread(f"camera {settings.device}", clock)
         self._released: Future[None] = self._worker.post(lambda: None)
@@ -64,6 +66,7 @@ class V4l2Camera(Closeable):
         self._drop_session()
         wait((self._released,), _CLOSING_S)  # a thread hung in a driver ends with the program
         self._worker.end()
+        self._lock.close()
 
     def identity(self) -> str:
         """Return card, driver, bus, image format, and the limitations of this camera."""

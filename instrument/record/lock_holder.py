@@ -1,19 +1,15 @@
-"""Processes that keep a record from being written, as far as Linux shows them in /proc."""
+"""Process that keeps a record from being written."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
-from instrument.text.terminal_safe import escape_control_characters
+from instrument.processes import locking, named, opened_by
 
 # SQLite's write-ahead log: the writer locks this byte of the file NAME-shm (WAL_WRITE_LOCK in
 # "WAL-mode File Format", section 2.3.1, and UNIX_SHM_BASE in os_unix.c of SQLite).
 _WRITE_LOCK = 120
-_LONGEST = 60  # characters of a command line that are shown
-_PROC = Path("/proc")
 
 
 def lock_holder(path: Path) -> str:
@@ -22,60 +18,10 @@ def lock_holder(path: Path) -> str:
     Where Linux does not show it: the processes that have the file open, or "another program".
     """
     own = os.getpid()
-    holders = [pid for pid in _locking(Path(f"{path}-shm")) if pid != own]
+    holders = [pid for pid in locking(Path(f"{path}-shm"), _WRITE_LOCK) if pid != own]
     if holders:
-        return ", ".join(map(_named, holders))
-    users = [pid for pid in _opened_by(path) if pid != own]
+        return ", ".join(map(named, holders))
+    users = [pid for pid in opened_by(path) if pid != own]
     if users:
-        return f"one of those that have it open: {', '.join(map(_named, users))}"
+        return f"one of those that have it open: {', '.join(map(named, users))}"
     return "another program"
-
-
-def _locking(file: Path) -> Iterator[int]:
-    """Yield the processes with an exclusive lock on the byte of the write lock.
-
-    A line of /proc/locks: `1: POSIX  ADVISORY  WRITE 4711 08:01:1234 120 120`.
-    """
-    try:
-        inode = file.stat().st_ino
-        lines = (_PROC / "locks").read_text().splitlines()
-    except OSError:
-        return
-    for words in map(str.split, lines):
-        if len(words) != 8 or words[3] != "WRITE" or words[5].rpartition(":")[2] != str(inode):
-            continue
-        last = float("inf") if words[7] == "EOF" else int(words[7])
-        if int(words[6]) <= _WRITE_LOCK <= last and int(words[4]) > 0:
-            yield int(words[4])
-
-
-def _opened_by(file: Path) -> Iterator[int]:
-    """Yield the processes that have a file open; those of other users are not visible."""
-    try:
-        wanted = file.stat()
-    except OSError:
-        return
-    for process in _PROC.glob("[0-9]*"):
-        with suppress(OSError):  # ended meanwhile, or of another user
-            if any(_is_same(link, wanted) for link in (process / "fd").iterdir()):
-                yield int(process.name)
-
-
-def _is_same(link: Path, wanted: os.stat_result) -> bool:
-    try:
-        return os.path.samestat(link.stat(), wanted)
-    except OSError:
-        return False
-
-
-def _named(pid: int) -> str:
-    """Return a process as its number and its command line."""
-    try:
-        words = (_PROC / str(pid) / "cmdline").read_bytes().replace(b"\0", b" ")
-    except OSError:
-        words = b""
-    command = escape_control_characters(" ".join(words.decode(errors="replace").split()))
-    if not command:
-        return f"process {pid}"
-    short = command if len(command) <= _LONGEST else command[:_LONGEST] + "..."
-    return f"process {pid} ({short})"

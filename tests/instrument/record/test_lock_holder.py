@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from instrument import processes
 from instrument.record import lock_holder as module
 from instrument.record.lock_holder import lock_holder
 from instrument.record.record import FILE_NAME, Record
@@ -30,7 +31,7 @@ def test_without_the_kernels_table_those_that_have_it_open_are_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "run" / FILE_NAME
-    monkeypatch.setattr(module, "_locking", lambda _: iter(()))
+    monkeypatch.setattr(module, "locking", lambda *_: iter(()))
     with Record.create(tmp_path / "run", {}):
         assert lock_holder(file) == "another program"
         with held(file) as holder:
@@ -53,7 +54,7 @@ def test_a_command_line_is_printable_and_short(
     )
     (tmp_path / "12").mkdir()
     (tmp_path / "12" / "cmdline").write_bytes(b"edit\x1b[2J\0" + b"\xff" + b"x" * 100)
-    monkeypatch.setattr(module, "_PROC", tmp_path)
+    monkeypatch.setattr(processes, "_PROC", tmp_path)
     found = lock_holder(tmp_path / "record.sqlite")
     assert found.startswith("process 12 (edit\\x1b[2J \ufffdxxx")
     assert found.endswith("xxx...)")

@@ -1,0 +1,111 @@
+"""One program at a time opens a device; the other is told who has it."""
+
+from __future__ import annotations
+
+import logging
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from drivers.factory import Lines
+from drivers.lines import device_lock
+from drivers.lines.device_lock import DeviceInUse, DeviceLock
+from drivers.lines.modbus_client import BusSettings
+from instrument.clock import SystemClock
+from tests.support.paths import ROOT
+
+HOLD = """
+import sys
+from pathlib import Path
+from drivers.lines import device_lock
+device_lock._FOLDERS = (Path(sys.argv[2]),)
+with device_lock.DeviceLock("axis", sys.argv[1]):
+    print("held", flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is left behind in the machine's folder for locks."""
+    monkeypatch.setattr(device_lock, "_FOLDERS", (tmp_path,))
+
+
+@contextmanager
+def held_by_another(device: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLD, device, str(folder)], cwd=ROOT, text=True,
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    ) as other:  # fmt: skip
+        assert other.stdout is not None
+        assert other.stdout.readline() == "held\n"
+        try:
+            yield other
+        finally:
+            other.kill()
+
+
+def test_a_device_that_another_program_has_is_refused_with_its_name(tmp_path: Path) -> None:
+    device = f"tcp://{tmp_path.name}:502"
+    with held_by_another(device, tmp_path) as other:
+        pattern = rf"theta_r: {device} is in use by process {other.pid} \(.*\): wait for its end"
+        with pytest.raises(DeviceInUse, match=pattern):
+            DeviceLock("theta_r", device)
+        DeviceLock("theta_r", f"{device}0").close()  # another device
+    with DeviceLock("theta_r", device), pytest.raises(DeviceInUse, match="this program, which"):
+        DeviceLock("dphi", device.upper().replace("TCP", "tcp"))
+    DeviceLock("theta_r", device).close()
+
+
+def test_a_second_program_sends_nothing_to_a_gateway(tmp_path: Path) -> None:
+    """Nobody listens there: to have tried would be another error."""
+    gateway = f"tcp://localhost.{tmp_path.name}:502"
+    with (
+        held_by_another(gateway, tmp_path),
+        Lines(SystemClock()) as lines,
+        pytest.raises(DeviceInUse, match="nothing was sent to the device"),
+    ):
+        lines.modbus("theta_r", BusSettings(gateway))
+
+
+def test_a_port_that_does_not_open_is_free_again(tmp_path: Path) -> None:
+    port = str(tmp_path / "nobody")
+    (tmp_path / "nobody").touch()
+    with Lines(SystemClock()) as lines:
+        for _ in range(2):
+            with pytest.raises(Exception, match="cannot open"):
+                lines.serial("theta_r", port, 57600, 0.15)
+
+
+def test_without_a_place_for_locks_that_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(device_lock, "_FOLDERS", (tmp_path / "nowhere",))
+    with caplog.at_level(logging.WARNING), DeviceLock("theta_r", "/dev/null"):
+        assert "/dev/null: another program that uses it would not be noticed" in caplog.text
+
+
+def test_a_link_in_place_of_the_lock_is_not_followed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder is open to all users."""
+    first, second = tmp_path / "first", tmp_path / "second"
+    first.mkdir()
+    second.mkdir()
+    target = tmp_path / "target"
+    (first / "gonio-port.lock").symlink_to(target)
+    monkeypatch.setattr(device_lock, "_FOLDERS", (first, second))
+    with DeviceLock("theta_r", "port"):
+        assert not target.exists()
+        assert (second / "gonio-port.lock").exists()
+
+
+def test_a_path_at_which_there_is_nothing_needs_no_lock(tmp_path: Path) -> None:
+    """An emulated camera is seen by its own process only, under the same path in each."""
+    path = str(tmp_path / "camera")
+    with DeviceLock("camera", path), DeviceLock("camera", path):
+        assert list(tmp_path.iterdir()) == []
