@@ -171,7 +171,8 @@ def _different(curves: FloatArray, chi2: FloatArray, count: int) -> IntArray:
     while len(chosen) < count:
         distance = np.sum(np.square(curves - curves[chosen[-1]]), axis=1)
         nearest = np.minimum(nearest, distance)
-        different = nearest / np.maximum(chi2, 1e-300)
+        with np.errstate(over="ignore"):  # inf: far more than its chi2
+            different = nearest / np.maximum(chi2, 1e-300)
         if np.max(different) < _SAME_CURVE:
             break
         chosen.append(int(np.argmax(different)))

@@ -8,7 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear, nnls
 
-from analysis.fit.search.starting_values import bounded_least_squares, starting_values
+from analysis.fit.search.starting_values import (
+    _different,
+    bounded_least_squares,
+    starting_values,
+)
 from analysis.models import MODELS
 from instrument.geometry import FloatArray
 from tests.support.analysis.seeded_scan import noise_free, problem_of
@@ -102,3 +106,9 @@ def test_starting_values_lie_within_the_domain_and_off_zero(name: str, most: int
     for x in found:
         assert np.all((problem.low <= x) & (x <= problem.high))
         assert all(value > 0 for value in x)
+
+
+def test_a_curve_that_fits_exactly_is_told_from_one_that_is_far_away() -> None:
+    """Their distance in relation to a chi2 of zero is no number."""
+    curves = np.array([[0.0, 0.0], [1e17, 0.0], [0.0, 0.0]])
+    assert _different(curves, np.zeros(3), 3).tolist() == [0, 1]
