@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -35,6 +36,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     real.addoption("--allow-motion", action="store_true", help="the rig is clear: stages may move")
     real.addoption("--rig", type=Path, help="the rig file that names the real devices")
     real.addoption("--axis", action="append", help="an axis of it to move; default: all motors")
+
+
+def pytest_configure() -> None:
+    """Undo what `nohup` and a shell's background do: programs under test would ignore stops."""
+    defaults = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL,
+                signal.SIGQUIT: signal.SIG_DFL}  # fmt: skip
+    for number, default in defaults.items():
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, default)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
