@@ -17,6 +17,7 @@ from acquisition.engine.resume import Progress
 from acquisition.plan.moves import moves_between
 from acquisition.plan.plan import Plan, make_plan
 from acquisition.plan.pose import home_pose
+from acquisition.results.damage import damage_text
 from acquisition.results.model_check import check_model
 from acquisition.results.run_folder import (
     default_folder,
@@ -25,11 +26,12 @@ from acquisition.results.run_folder import (
     write_run_inputs,
 )
 from acquisition.rig import check_ready
+from acquisition.terminal.console import console
 from acquisition.terminal.operator import require_yes
 from acquisition.terminal.progress import sign_of_life
 from instrument.config.load import Loaded, load_protocol
 from instrument.errors import OperatorStop
-from instrument.record.event_kinds import FAULT, RESUMED, STOPPED
+from instrument.record.event_kinds import DAMAGED, FAULT, RESUMED, STOPPED
 from instrument.record.record import Record
 
 
@@ -69,6 +71,7 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
             check_ready(loaded)
             with record.claimed():
                 _confirm(yes, len(missing), record)
+                _remove_damaged(record)
                 scan(loaded, plan, record, progress)
         _finish(record, loaded, as_json)
 
@@ -131,6 +134,7 @@ def _confirm(yes: bool, steps: int, record: Record) -> None:
     ends = [(kind, why) for _, kind, why in record.events() if kind in (FAULT, STOPPED)]
     if not yes:
         last = f"The scan ended with: {ends[-1][1]}\n" if ends else ""
+        last += f"{damage_text(record)}\n" if record.damaged() else ""
         require_yes(
             f"{last}{steps} readings are missing. Is the rig clear, may the stage move?",
             "gonio resume: nobody to ask whether the rig may move: add --yes",
@@ -138,3 +142,12 @@ def _confirm(yes: bool, steps: int, record: Record) -> None:
         )
     how = "--yes" if yes else "yes, asked at the terminal"
     record.add_event(datetime.now(UTC).isoformat(), RESUMED, f"the rig may move: {how}")
+
+
+def _remove_damaged(record: Record) -> None:
+    """Remove the rows that are measured again; the record and the operator are told which."""
+    text = damage_text(record)
+    if text:
+        record.remove_damaged()
+        record.add_event(datetime.now(UTC).isoformat(), DAMAGED, text)
+        console.print(f"{text}; readings are measured again", highlight=False, soft_wrap=True)

@@ -92,7 +92,6 @@ class Engine:
                 self._scan(plan, plan.steps)
             else:
                 self._resume(plan, progress)
-                self._scan(plan, progress.missing(plan))
         finally:
             self._ended = True
             self._positioner.make_safe()
@@ -123,12 +122,24 @@ class Engine:
         self._exposer.take_darks(plan.darks_first_s)
 
     def _resume(self, plan: Plan, progress: Progress) -> None:
-        """Restore the state in which the scan stopped, and check the lamp for drift."""
-        first = progress.missing(plan)[0]
+        """Restore the state in which the scan stopped, and measure what is missing.
+
+        The lamp is checked for drift at the first step, and wherever it is set again for a block
+        of which readings are kept: one of them was damaged in the record.
+        """
         self._positioner.recover_position()
         self._open_shutter()
         self._exposer.restore(progress.readings)
         self._exposer.take_darks(plan.darks_first_s)
+        kept = {reading.block for reading in progress.readings}
+        for number, steps in enumerate(progress.missing_by_block(plan)):
+            if number == 0 or steps[0].block in kept:
+                so_far = progress if number == 0 else Progress.of(self._record)
+                self._continue_from(plan, so_far, steps[0])
+            self._scan(plan, steps)
+
+    def _continue_from(self, plan: Plan, progress: Progress, first: Step) -> None:
+        """Check the lamp for drift, and return to the last accepted pose."""
         self._check_drift(plan, progress, first)
         last = progress.last_step(plan, first.block)
         if last is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import groupby
 
 from acquisition.measure.drift import JUMP_U, MIN_JUMP, Drift, is_usable, rate
 from acquisition.plan.plan import Plan, Step
@@ -38,16 +39,20 @@ class Progress:
         done = self.done
         return tuple(step for step in plan.steps if step.index not in done)
 
+    def missing_by_block(self, plan: Plan) -> list[list[Step]]:
+        """Return the steps still to be measured, those of each block of the lamp in a list."""
+        return [list(steps) for _, steps in groupby(self.missing(plan), key=lambda s: s.block)]
+
     def drift_step(self, plan: Plan, block: int) -> Step | None:
         """Return the step of the block's last usable drift check, or None without one."""
-        checks = (r for r in reversed(self.readings) if r.kind == "drift" and r.block == block)
+        latest = sorted(self.readings, key=lambda r: -r.time_s)
+        checks = (r for r in latest if r.kind == "drift" and r.block == block)
         return next((plan.steps[r.step] for r in checks if is_usable(r)), None)
 
     def last_step(self, plan: Plan, block: int) -> Step | None:
         """Return the last accepted step if it belongs to the block, else None."""
-        if not self.readings or self.readings[-1].block != block:
-            return None
-        return plan.steps[self.readings[-1].step]
+        last = max(self.readings, key=lambda r: r.time_s, default=None)
+        return None if last is None or last.block != block else plan.steps[last.step]
 
     def check_drift(self, repeated: Reading, next_step: Step) -> Check:
         """Compare the repeated drift reference with the rate predicted from earlier checks."""

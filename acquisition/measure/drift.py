@@ -92,14 +92,18 @@ class Drift:
     @classmethod
     def of(cls, readings: Sequence[Reading], block: int, checks: Sequence[Check] = ()) -> Drift:
         """Return the drift from the usable checks of one block and those made at a resume."""
-        planned = [r for r in readings if r.kind == "drift" and r.block == block and is_usable(r)]
+        planned = sorted(
+            (r for r in readings if r.kind == "drift" and r.block == block and is_usable(r)),
+            key=lambda r: r.time_s,
+        )
         if not planned:
             return cls((), math.nan)
         jumps = [c for c in checks if c.jumped and c.reading.block == block]
-        bounds = [-1, *(c.before_step for c in jumps), math.inf]
+        # By time: a reading that is measured again comes after later steps of the plan.
+        bounds = [-math.inf, *(c.reading.time_s for c in jumps), math.inf]
         heads: list[list[Reading]] = [[], *([c.reading] for c in jumps)]
         groups = [
-            [*head, *(r for r in planned if low <= r.step < high)]
+            [*head, *(r for r in planned if low < r.time_s <= high)]
             for head, low, high in zip(heads, bounds[:-1], bounds[1:], strict=True)
         ]
         first = rate(planned[0])

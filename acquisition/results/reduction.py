@@ -133,7 +133,7 @@ def reduce(readings: Sequence[Reading], protocol: Protocol, checks: Sequence[Che
     points = tuple(r for r in readings if r.kind == "point")
     blocks = sorted({r.block for r in readings})
     drifts = {block: Drift.of(readings, block, checks) for block in blocks}
-    placements = _placements(readings)
+    placements = _placements(sorted(readings, key=lambda r: r.time_s))
     tiles = {
         r.lamp_setting: _tile(r, drifts[r.block], placements[r.step])
         for r in readings
@@ -208,7 +208,7 @@ def _shared(points: Sequence[Reading], placements: Mapping[int, int]) -> tuple[S
 
 
 def _placements(readings: Sequence[Reading]) -> dict[int, int]:
-    """Number of swaps of sample and tile before each reading, by its step."""
+    """Number of swaps of sample and tile before each reading, by its step; in order of time."""
     before = (*readings[:1], *readings)
     changes = [a.surface != b.surface for a, b in zip(readings, before, strict=False)]
     steps = (r.step for r in readings)

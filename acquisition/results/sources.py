@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from acquisition.results.damage import damage_text
 from acquisition.results.fitting import measurements
 from acquisition.results.reduction import reduced_run, require_usable
 from acquisition.results.run_folder import load_run_inputs
@@ -119,8 +120,10 @@ def _run(path: Path) -> Source:
     with Record.open(path) as record:
         loaded = load_run_inputs(record)
         reduced = reduced_run(record, loaded)
+        damage = damage_text(record)
     require_usable(reduced)
-    notes = _flagged(int(np.sum(~reduced.valid)), reduced.valid.size)
+    left_out = (Note(NoteCode.DAMAGED, damage),) if damage else ()
+    notes = left_out + _flagged(int(np.sum(~reduced.valid)), reduced.valid.size)
     acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
     try:
         found = measurements(reduced, loaded)

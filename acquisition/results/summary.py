@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from acquisition.results.damage import damage_text
 from acquisition.results.fitting import Fitted, u_without
 from acquisition.results.reduction import DARK, NOISE, ROUNDING, Reduced
 from analysis.choice.notes import NoteCode
@@ -104,6 +105,7 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
     of_fit = () if fitted.choice is None else fitted.choice.notes
     found = (
         "" if loaded.rig.real else "all data are simulated",
+        damage_text(record),
         _unfinished_note(record),
         _interruptions_note(record),
         fitted.reason if fitted.choice is not None else "",

@@ -33,6 +33,7 @@ class NoteCode(StrEnum):
     SEARCH_END = "search_end"
     # Source of the measurements.
     FLAGGED = "flagged"
+    DAMAGED = "damaged"
     REPEATS = "repeats"
     IGNORED_U = "ignored_u"
     U_SHARED = "u_shared"

@@ -14,4 +14,5 @@ HOT: Final = "hot pixels"  # left out of the window's mean, with their positions
 STOPPED: Final = "stopped"  # the operator ended the scan
 FAULT: Final = "fault"  # a device or the disk ended the scan
 RESUMED: Final = "resumed"  # the scan continued
+DAMAGED: Final = "damaged"  # rows that changed on the disk were removed, to be replaced
 FINISHED: Final = "finished"  # the last step was accepted

@@ -1,8 +1,10 @@
 """Schemas of earlier versions of the program, whose records still open, resume and report.
 
-Their tables have the columns of the current schema but no rules, so `validation` checks every value
+No row has a seal. The tables of version 3 have no rules either, so `validation` checks every value
 by a query. A record keeps the schema with which it was created.
 """
+
+from instrument.record.schema import tables_sql
 
 _READING_3 = (
     "kind TEXT NOT NULL, surface TEXT NOT NULL, theta_i_deg REAL, dphi_deg REAL, theta_r_deg REAL, "
@@ -32,5 +34,5 @@ CREATE TABLE drift_at_resume (before_step INTEGER NOT NULL, expected REAL NOT NU
                               step INTEGER NOT NULL, {_READING_3});
 """
 
-OLDER_SQL = {3: _SQL_3}
+OLDER_SQL = {3: _SQL_3, 4: tables_sql(seals=False)}
 """The statements that make the tables, by schema version."""

@@ -23,24 +23,37 @@ from instrument.devices import Frame
 from instrument.errors import GonioError, InputError, StorageError
 from instrument.record.network_share import network_share
 from instrument.record.reading import Check, Preview, Reading
-from instrument.record.schema import LEAST_SQLITE, MARKS, TABLES, begin, connect
+from instrument.record.schema import (
+    LEAST_SQLITE,
+    SCHEMA_VERSION,
+    TABLES,
+    connect,
+    create_tables,
+    has_seals,
+)
+from instrument.record.seal import Damaged, sealed
 from instrument.record.validation import check_files, check_schema, check_values
 from instrument.record.write_lock import begin_writing, held_by_another, is_busy
 from instrument.text.atomic_file import disk_full, explain_os_error, make_folder, sync_folder
 
 FILE_NAME = "record.sqlite"
 LOCK_NAME = ".scanning"
-_READING_NAMES = [column.name for column in TABLES["reading"]]
+_NAMES = {table: [c.name for c in columns] for table, columns in TABLES.items()}
 _NOT_PERMITTED = ("SQLITE_READONLY", "SQLITE_PERM", "SQLITE_CANTOPEN")
 
 
 class Record(Closeable):
-    """Open record; use it with `with`. Every `add_...` is on disk when it returns."""
+    """Open record; use it with `with`. Every `add_...` is on disk when it returns.
+
+    Rows that were damaged since they were written are left out of everything that it returns.
+    """
 
     def __init__(self, connection: sqlite3.Connection, folder: Path) -> None:
         self._db = connection
         self.folder = folder
         self._file = (folder / FILE_NAME).stat()
+        self._version = SCHEMA_VERSION
+        self._damaged: Damaged = {}
 
     @classmethod
     def create(cls, folder: Path, meta: Mapping[str, str]) -> Record:
@@ -54,7 +67,7 @@ class Record(Closeable):
                 )
             make_folder(folder)
             database = connect(folder / FILE_NAME)
-            begin(database, meta)
+            _begin(database, meta)
             sync_folder(folder)
         except (OSError, sqlite3.Error) as error:
             why = _explain(error, folder)
@@ -73,7 +86,8 @@ class Record(Closeable):
         with ExitStack() as on_failure:
             try:
                 record = on_failure.enter_context(cls(connect(path), folder))
-                check_values(record._db, path, check_schema(record._db, path))
+                record._version = check_schema(record._db, path)
+                record._damaged = check_values(record._db, path, record._version)
             except (sqlite3.Error, UnicodeDecodeError) as error:  # names and texts of any bytes
                 raise _refusal(error, path) from error
             on_failure.pop_all()
@@ -110,33 +124,30 @@ class Record(Closeable):
 
     def meta(self, key: str) -> str | None:
         """Return one entry of the run's description, None if there is none."""
-        row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
-        return None if row is None else str(row[0])
+        return {str(k): str(v) for k, v in self._rows("meta")}.get(key)
 
     def set_meta(self, key: str, value: str) -> None:
         """Set one entry of the run's description."""
-        self._write("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, value))
+        self._write("meta", (key, value), replace=True)
 
     def add_device(self, role: str, identity: str) -> None:
         """Store the identity that a device gave; `role` is its place on the rig."""
-        self._write("INSERT OR REPLACE INTO device VALUES (?, ?)", (role, identity))
+        self._write("device", (role, identity), replace=True)
 
     def add_settings(self, time_utc: str, role: str, settings: Mapping[str, str]) -> None:
         """Store a device's settings by name, units in the names."""
-        with self._writing() as database:
-            rows = [(time_utc, role, *setting) for setting in settings.items()]
-            database.executemany("INSERT INTO setting VALUES (NULL, ?, ?, ?, ?)", rows)
+        rows = [(None, time_utc, role, *setting) for setting in settings.items()]
+        self._write("setting", *rows)
 
     def add_event(self, time_utc: str, kind: str, text: str) -> None:
         """Store an event; `kind` is one of `event_kinds`."""
-        self._write("INSERT INTO event VALUES (NULL, ?, ?, ?)", (time_utc, kind, text))
+        self._write("event", (None, time_utc, kind, text))
 
     def add_dark(
         self, time_utc: str, exposure_s: float, frames: int, mean_dn: float, noise_dn: float
     ) -> None:
         """Store a dark measurement: mean count and temporal noise of one pixel, in DN."""
-        row = (time_utc, exposure_s, frames, mean_dn, noise_dn)
-        self._write("INSERT INTO dark VALUES (NULL, ?, ?, ?, ?, ?)", row)
+        self._write("dark", (None, time_utc, exposure_s, frames, mean_dn, noise_dn))
 
     def add_reading(
         self,
@@ -155,27 +166,39 @@ class Record(Closeable):
             (reading.step, number, frame.exposure_s, frame.time_s, frame.device_time_s, name)
             for number, (frame, name) in enumerate(zip(frames, names, strict=True))
         ]
-        with self._writing() as database:
-            database.executemany("INSERT INTO frame VALUES (?, ?, ?, ?, ?, ?)", rows)
-            database.execute(f"INSERT INTO reading VALUES ({MARKS})", astuple(reading))
+        with self._writing():
+            self._insert("frame", rows)
+            self._insert("reading", [astuple(reading)])
             if preview is not None:
                 row = (preview.step, preview.caption, preview.png, json.dumps(preview.polygon))
-                database.execute("INSERT INTO preview VALUES (?, ?, ?, ?)", row)
+                self._insert("preview", [row])
 
     def add_check(self, check: Check) -> None:
         """Store the drift check that was made when the scan resumed."""
         head = (check.before_step, check.expected, check.u_expected, check.jumped)
-        row = (*head, *astuple(check.reading))
-        self._write(f"INSERT INTO drift_at_resume VALUES (?, ?, ?, ?, {MARKS})", row)
+        self._write("drift_at_resume", (*head, *astuple(check.reading)))
+
+    def damaged(self) -> tuple[str, ...]:
+        """Return the rows that were damaged since they were written: `reading 5`, `event 2`."""
+        return tuple(f"{table} {row}" for table, rows in self._damaged.items() for row in rows)
+
+    def remove_damaged(self) -> None:
+        """Remove the damaged rows, and what belongs to a reading that is no longer there."""
+        with self._writing() as database:
+            for table, rows in self._damaged.items():
+                database.executemany(f"DELETE FROM {table} WHERE rowid = ?", [(r,) for r in rows])
+            for table in ("frame", "preview"):
+                orphans = "step NOT IN (SELECT step FROM reading)"
+                database.execute(f"DELETE FROM {table} NOT INDEXED WHERE {orphans}")
+            database.execute("REINDEX")
+        self._damaged = {}
 
     def readings(self) -> list[Reading]:
         """Return all measured geometries in the plan's order."""
-        rows = self._db.execute("SELECT * FROM reading ORDER BY step").fetchall()
-        return [_reading(row) for row in rows]
+        return [_reading(row) for row in self._rows("reading", "step")]
 
     def checks(self) -> list[Check]:
         """Return the drift checks that were made at each resume, in order."""
-        rows = self._db.execute("SELECT * FROM drift_at_resume ORDER BY rowid").fetchall()
         return [
             Check(
                 before_step=before_step,
@@ -184,43 +207,59 @@ class Record(Closeable):
                 jumped=bool(jumped),
                 reading=_reading(row),
             )
-            for before_step, expected, u_expected, jumped, *row in rows
+            for before_step, expected, u_expected, jumped, *row in self._rows("drift_at_resume")
         ]
 
     def settings(self) -> dict[str, dict[str, str]]:
         """Return the last settings of each device, by role and name."""
         found: dict[str, dict[str, str]] = {}
-        rows = self._db.execute("SELECT role, name, value FROM setting ORDER BY id")
-        for role, name, value in rows:
+        for _, _, role, name, value in self._rows("setting"):
             found.setdefault(role, {})[name] = value
         return found
 
     def frame_files(self) -> list[str]:
         """Return the files of all kept frames, relative to the run's folder."""
-        sql = "SELECT file FROM frame WHERE file IS NOT NULL ORDER BY step, number"
-        return [name for (name,) in self._db.execute(sql)]
+        rows = self._rows("frame", "step, number")
+        return [str(name) for *_, name in rows if name is not None]
 
     def previews(self) -> list[Preview]:
         """Return all previews in the plan's order."""
-        rows = self._db.execute("SELECT * FROM preview ORDER BY step")
+        rows = self._rows("preview", "step")
         return [Preview(step, text, png, json.loads(outline)) for step, text, png, outline in rows]
 
     def devices(self) -> dict[str, str]:
         """Return the identity of every device, by role."""
-        return dict(self._db.execute("SELECT role, identity FROM device ORDER BY role"))
+        return dict(self._rows("device", "role"))
 
     def darks(self) -> list[tuple[float, int, float, float]]:
         """Return exposure (s), frames, mean and noise (DN) of every dark, by exposure."""
-        sql = "SELECT exposure_s, frames, mean_dn, noise_dn FROM dark ORDER BY exposure_s, id"
-        return list(self._db.execute(sql))
+        return [row[2:] for row in self._rows("dark", "exposure_s, id")]
 
     def events(self) -> Iterator[tuple[str, str, str]]:
         """Yield time, kind and text of every event, in order."""
-        yield from self._db.execute("SELECT time_utc, kind, text FROM event ORDER BY id")
+        yield from (row[1:] for row in self._rows("event"))
 
-    def _write(self, sql: str, row: Sequence[object]) -> None:
-        with self._writing() as database:
-            database.execute(sql, row)
+    def _rows(self, table: str, order: str = "rowid") -> Iterator[tuple[Any, ...]]:
+        """Yield the undamaged rows of a table, read from it and not from an index."""
+        left_out = ", ".join(map(str, self._damaged.get(table, ())))
+        yield from self._db.execute(
+            f"SELECT {', '.join(_NAMES[table])} FROM {table} NOT INDEXED "
+            f"WHERE rowid NOT IN ({left_out}) ORDER BY {order}"
+        )
+
+    def _write(self, table: str, *rows: Sequence[object], replace: bool = False) -> None:
+        with self._writing():
+            self._insert(table, rows, replace=replace)
+
+    def _insert(
+        self, table: str, rows: Iterable[Sequence[object]], *, replace: bool = False
+    ) -> None:
+        """Insert rows in the transaction that is open, sealed if the record's version has seals."""
+        seals = has_seals(self._version)
+        marks = ", ".join("?" * (len(_NAMES[table]) + seals))
+        whole = [sealed(table, row) if seals else row for row in rows]
+        sql = f"INSERT{' OR REPLACE' * replace} INTO {table} VALUES ({marks})"
+        self._db.executemany(sql, whole)
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
@@ -245,6 +284,15 @@ class Record(Closeable):
             same = False
         if not same:
             raise StorageError(f"{path}: {_absence(self._file)}")
+
+
+def _begin(database: sqlite3.Connection, meta: Mapping[str, str]) -> None:
+    """Create all tables and the run's description in one transaction: a whole record or none."""
+    database.execute("BEGIN")
+    with database:
+        create_tables(database)
+        for row in {"schema_version": str(SCHEMA_VERSION), **meta}.items():
+            database.execute("INSERT INTO meta VALUES (?, ?, ?)", sealed("meta", row))
 
 
 def _refusal(error: Exception, path: Path) -> GonioError:
@@ -331,4 +379,4 @@ def _require_support(folder: Path) -> None:
 def _reading(row: Iterable[Any]) -> Reading:
     """Return a row as a reading; SQLite stores NaN as NULL."""
     values: list[Any] = [math.nan if value is None else value for value in row]
-    return Reading(**dict(zip(_READING_NAMES, values, strict=True)))
+    return Reading(**dict(zip(_NAMES["reading"], values, strict=True)))

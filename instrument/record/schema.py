@@ -1,7 +1,8 @@
 """Schema of the run record: its tables, the allowed values of each column, and the connection.
 
 All tables are STRICT, and every rule is a CHECK whose name says what is allowed. SQLite refuses
-other values when a row is written, and `PRAGMA quick_check` finds them in a file from elsewhere. A
+other values when a row is written, and `PRAGMA quick_check` finds them in a file from elsewhere.
+Each row ends in its seal, see `seal`, which shows whether a value changed since it was written. A
 released schema never changes: a change here needs a new SCHEMA_VERSION, and the SQL of the old
 version moves to `older_versions`.
 """
@@ -9,7 +10,7 @@ version moves to `older_versions`.
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple, get_args
 
@@ -17,7 +18,8 @@ from instrument.devices import Surface
 from instrument.record.reading import Kind
 from instrument.record.write_lock import TRY_S
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
+FIRST_STRICT, _FIRST_SEALED = 4, 5  # schema versions
 MOST_BYTES = 128 * 1024**2  # of one text or picture; the largest camera's picture needs half of it
 LEAST_SQLITE = (3, 37, 0)  # the first with STRICT tables
 _OPENING_S = 2.0  # of waiting for a lock; nothing moves yet
@@ -81,7 +83,12 @@ def _text(name: str) -> Column:
     return Column(name, "TEXT", "", "text in UTF-8")
 
 
-_ID = Column("id", "INTEGER", "", "a whole number")
+ASSIGNED = Column("id", "INTEGER", "", "a whole number")
+"""Number of a row, which SQLite assigns."""
+
+SEAL = _integer("crc32", 0, 2**32 - 1)
+"""Last column of each table; `TABLES` holds the others."""
+
 _META_VALUE = Column(
     "value",
     "TEXT",
@@ -118,10 +125,10 @@ _READING = (
 TABLES: dict[str, tuple[Column, ...]] = {
     "meta": (_text("key"), _META_VALUE),
     "device": (_text("role"), _text("identity")),
-    "setting": (_ID, _plain("time_utc"), _text("role"), _text("name"), _text("value")),
-    "event": (_ID, _plain("time_utc"), _text("kind"), _text("text")),
+    "setting": (ASSIGNED, _plain("time_utc"), _text("role"), _text("name"), _text("value")),
+    "event": (ASSIGNED, _plain("time_utc"), _text("kind"), _text("text")),
     "dark": (
-        _ID, _plain("time_utc"), _EXPOSURE_S, _integer("frames", 1), _number("mean_dn"),
+        ASSIGNED, _plain("time_utc"), _EXPOSURE_S, _integer("frames", 1), _number("mean_dn"),
         _number("noise_dn"),
     ),
     "frame": (
@@ -142,8 +149,10 @@ TABLES: dict[str, tuple[Column, ...]] = {
 }  # fmt: skip
 """All tables with their columns; the first column identifies a row in messages."""
 
-MARKS = ", ".join("?" * len(_READING))
-"""One `?` for each column of a reading."""
+
+def tables_sql(*, seals: bool) -> str:
+    """Return the statements that make the tables, each ending in a semicolon."""
+    return "".join(_create(name, (*own, SEAL) if seals else own) for name, own in TABLES.items())
 
 
 def _create(table: str, columns: tuple[Column, ...]) -> str:
@@ -153,8 +162,12 @@ def _create(table: str, columns: tuple[Column, ...]) -> str:
     return f"CREATE TABLE {table} (\n  " + ",\n  ".join(rows) + "\n) STRICT;\n"
 
 
-SQL = "".join(_create(table, columns) for table, columns in TABLES.items())
-"""The statements that make the tables, each ending in a semicolon."""
+SQL = tables_sql(seals=True)
+
+
+def has_seals(version: int) -> bool:
+    """Return True for a schema version whose rows are sealed."""
+    return version >= _FIRST_SEALED
 
 
 def harden_connection(database: sqlite3.Connection) -> None:
@@ -178,11 +191,7 @@ def connect(path: Path) -> sqlite3.Connection:
     return database
 
 
-def begin(database: sqlite3.Connection, meta: Mapping[str, str]) -> None:
-    """Create all tables and the run's description in one transaction: a whole record or none."""
-    database.execute("BEGIN")
-    with database:
-        for statement in SQL.split(";"):
-            database.execute(statement)
-        rows = {"schema_version": str(SCHEMA_VERSION), **meta}
-        database.executemany("INSERT INTO meta VALUES (?, ?)", rows.items())
+def create_tables(database: sqlite3.Connection) -> None:
+    """Create all tables in the transaction that is open."""
+    for statement in SQL.split(";"):
+        database.execute(statement)

@@ -2,15 +2,17 @@
 
 They cover the files, before SQLite opens them; the schema, which must be exactly that of a version
 of this program, since a view or a trigger would run code; and every value. The rules for values are
-part of the schema: in a record of the current version `PRAGMA quick_check` verifies them, and
-queries here do so in older ones. No schema can express the rules across rows, those for the
-outlines of previews and the encoding of texts; they are checked here, too.
+part of the schema: `PRAGMA quick_check` verifies them where the tables have them, and queries here
+do so in older records. No schema can express the rules across rows, those for the outlines of
+previews and the encoding of texts; they are checked here, too. A row that is not as it was sealed
+is damaged: the record opens without it, unless nothing can replace it.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import re
 import sqlite3
 import stat
 from collections.abc import Iterator
@@ -20,7 +22,8 @@ from pathlib import Path
 
 from instrument.errors import InputError
 from instrument.record.older_versions import OLDER_SQL
-from instrument.record.schema import SCHEMA_VERSION, SQL, TABLES
+from instrument.record.schema import FIRST_STRICT, SCHEMA_VERSION, SQL, TABLES, has_seals
+from instrument.record.seal import Damaged, damaged_rows
 
 MOST_READINGS = 2_000_000
 MOST_WORK = 100_000_000  # points times (blocks + resumes): reduction visits each pair
@@ -31,6 +34,8 @@ _KNOWN_SQL = {**OLDER_SQL, SCHEMA_VERSION: SQL}
 _NOT_BEGUN = (
     "stopped before the record had begun, so nothing was measured: remove the folder and run again"
 )
+_IRREPLACEABLE = ("meta", "drift_at_resume")
+_OF_A_VALUE = re.compile(r"(CHECK constraint failed|\S+ value) in \w")  # words of quick_check
 _ADVICE = "take an undamaged copy of the run"
 
 
@@ -71,12 +76,14 @@ def check_schema(database: sqlite3.Connection, path: Path) -> int:
     if not found:
         raise InputError(f"{path.parent}: {_NOT_BEGUN}")
     _refuse_code(found, path)
-    row = database.execute("SELECT value FROM meta WHERE key = 'schema_version'").fetchone()
+    row = database.execute(
+        "SELECT value FROM meta NOT INDEXED WHERE key = 'schema_version'"
+    ).fetchone()
     version = {str(number): number for number in _KNOWN_SQL}.get(row and row[0])
     if version is None:
         raise InputError(
             f"{path}: schema version {row and str(row[0])[:40]}; this program reads "
-            f"{' and '.join(map(str, _KNOWN_SQL))}: use the version of the program that made the "
+            f"{', '.join(map(str, _KNOWN_SQL))}: use the version of the program that made the "
             "run"
         )
     _compare(found, version, path)
@@ -119,31 +126,48 @@ def _schema(database: sqlite3.Connection) -> dict[str, tuple[str, object]]:
     }
 
 
-def check_values(database: sqlite3.Connection, path: Path, version: int) -> None:
-    """Refuse values that no scan can have written, in a record whose schema has been checked.
+def check_values(database: sqlite3.Connection, path: Path, version: int) -> Damaged:
+    """Return the damaged rows of a record whose schema has been checked; refuse other faults.
 
-    Raises `InputError`, and `sqlite3.Error` if the file is damaged.
+    Those are values that no scan can have written, and a damaged row of the run's description or of
+    a drift check at a resume: no later measurement replaces it. Raises `InputError`, and
+    `sqlite3.Error` if the file is damaged.
     """
-    fault = database.execute("PRAGMA quick_check(1)").fetchone()[0]
-    enforced = version == SCHEMA_VERSION and fault == "ok"
+    faults = [str(text) for (text,) in database.execute("PRAGMA quick_check") if text != "ok"]
+    structure = [text for text in faults if not _OF_A_VALUE.match(text)]
+    damaged = damaged_rows(database) if has_seals(version) and not structure else {}
+    enforced = version >= FIRST_STRICT and not faults
     problems = chain(
-        () if enforced else _wrong_values(database),
-        () if fault == "ok" else (f"is damaged ({str(fault)[:200]})",),
-        _too_many(database),
-        _wrong_previews(database),
+        () if enforced else _wrong_values(database, damaged),
+        () if damaged else (f"is damaged ({text[:200]})" for text in structure or faults),
+        _without_replacement(damaged),
+        _too_many(database, damaged),
+        _wrong_previews(database, damaged),
     )
     for text in problems:
         raise InputError(f"{path}: {text}: {_ADVICE}")
-    _decode_texts(database)
+    _decode_texts(database, damaged)
+    return damaged
 
 
-def _wrong_values(database: sqlite3.Connection) -> Iterator[str]:
+def _without_replacement(damaged: Damaged) -> Iterator[str]:
+    for table in _IRREPLACEABLE:
+        for row in damaged.get(table, ()):
+            yield f"{table}, row {row}: damaged since it was written, and nothing can replace it"
+
+
+def _sound(table: str, damaged: Damaged) -> str:
+    """Return SQL for a table and the condition that a row is not damaged."""
+    return f"{table} NOT INDEXED WHERE rowid NOT IN ({', '.join(map(str, damaged.get(table, ())))})"
+
+
+def _wrong_values(database: sqlite3.Connection, damaged: Damaged) -> Iterator[str]:
     """Yield the first value of each column that breaks the column's rule."""
     for table, columns in TABLES.items():
         key = _short(columns[0].name)
         for column in columns:
-            wrong = f"FROM {table} WHERE NOT {column.full_condition()} LIMIT 1"
-            for row, value in database.execute(f"SELECT {key}, {_short(column.name)} {wrong}"):
+            wrong = f"{_sound(table, damaged)} AND NOT {column.full_condition()} LIMIT 1"
+            for row, value in database.execute(f"SELECT {key}, {_short(column.name)} FROM {wrong}"):
                 yield f"{table} {row!r}: {column.name} is {value!r}; allowed: {column.allowed}"
 
 
@@ -153,22 +177,24 @@ def _short(column: str) -> str:
     return f"CASE WHEN typeof({column}) IN ('text', 'blob') THEN {beginning} ELSE {column} END"
 
 
-def _too_many(database: sqlite3.Connection) -> Iterator[str]:
+def _too_many(database: sqlite3.Connection, damaged: Damaged) -> Iterator[str]:
     counts = "SELECT COUNT(*), SUM(kind = 'point'), COUNT(DISTINCT block) FROM reading"
     total, points, blocks = database.execute(counts).fetchone()
     (resumes,) = database.execute("SELECT COUNT(*) FROM drift_at_resume").fetchone()
     if total > MOST_READINGS or (points or 0) * (blocks + resumes) > MOST_WORK:
         yield f"{total} readings, in {blocks} blocks and with {resumes} resumes, are too many"
-    twice = "FROM reading WHERE kind = 'drift' GROUP BY block, time_s HAVING COUNT(*) > 1 LIMIT 1"
+    drifts = f"{_sound('reading', damaged)} AND kind = 'drift'"
+    twice = f"FROM {drifts} GROUP BY block, time_s HAVING COUNT(*) > 1 LIMIT 1"
     for step, time_s in database.execute(f"SELECT MAX(step), time_s {twice}"):
         yield f"reading {step!r}: a second drift check at {time_s!r} s; allowed: one at a time"
 
 
-def _wrong_previews(database: sqlite3.Connection) -> Iterator[str]:
+def _wrong_previews(database: sqlite3.Connection, damaged: Damaged) -> Iterator[str]:
+    sound = _sound("preview", damaged)
     (size,) = database.execute("SELECT TOTAL(length(png)) FROM preview").fetchone()
     if size > _MOST_PREVIEW_BYTES:
         yield f"pictures of {size:.0f} bytes; allowed: {_MOST_PREVIEW_BYTES}"
-    for step, outline in database.execute("SELECT step, polygon FROM preview"):
+    for step, outline in database.execute(f"SELECT step, polygon FROM {sound}"):
         if not _is_outline(outline):
             yield f"preview {step!r}: has no outline that can be read; allowed: JSON [[x, y], ...]"
 
@@ -188,12 +214,12 @@ def _is_finite(value: object) -> bool:
     return isinstance(value, float | int) and abs(value) < _LARGEST_PIXEL and math.isfinite(value)
 
 
-def _decode_texts(database: sqlite3.Connection) -> None:
+def _decode_texts(database: sqlite3.Connection, damaged: Damaged) -> None:
     """Read every text once that need not be ASCII: bytes that are no UTF-8 raise `sqlite3.Error`.
 
     No rule of the schema can express it.
     """
     for table in ("meta", "device", "setting", "event", "preview"):
         texts = [column.name for column in TABLES[table] if column.sql_type == "TEXT"]
-        for _ in database.execute(f"SELECT {', '.join(texts)} FROM {table}"):
+        for _ in database.execute(f"SELECT {', '.join(texts)} FROM {_sound(table, damaged)}"):
             pass

@@ -77,6 +77,39 @@ def test_levels_after_a_jump_of_the_lamp_refer_to_the_check_at_the_resume(
     assert max(abs(uncorrected / uninterrupted - 1)) > 0.02
 
 
+@pytest.mark.parametrize("rig", ["bench_12bit", "paper_1995"])
+def test_readings_lost_in_the_middle_are_measured_again_with_the_lamp_of_then(
+    rig: str, tmp_path: Path
+) -> None:
+    """After the scan the lamp is 20 % darker; on the second rig it is set by hand for each block.
+
+    A point of each incidence, a tile and a drift check were damaged in the record.
+    """
+    loaded = small_scan(rig)
+    lamp = loaded.rig.lamp.model_copy(
+        update={"white_electrons_per_s": 0.8 * loaded.rig.lamp.white_electrons_per_s}
+    )
+    with Record.create(tmp_path / "run", {}) as record:
+        scan(loaded, record)
+        whole = record.readings()
+        brdf = reduce(whole, loaded.protocol, ()).brdf
+        middle = [r.step for r in whole if r.kind == "point"][2::5]
+        tile = next(r.step for r in whole if r.kind == "tile")
+        drift = [r.step for r in whole if r.kind == "drift"][1]
+        lost = sorted([*middle, tile, drift])
+        record._damaged = {"reading": tuple(lost)}
+        record.remove_damaged()
+        assert len(record.readings()) == len(whole) - 4
+        scan(changed(loaded, rig={"lamp": lamp}), record)
+        found, checks = record.readings(), record.checks()
+    assert [r.step for r in found] == [r.step for r in whole]
+    assert [c.before_step for c in checks if c.jumped] == (
+        lost[:1] if rig == "bench_12bit" else [lost[0], middle[1]]
+    )
+    again = reduce(found, loaded.protocol, checks).brdf
+    assert again == pytest.approx(brdf, rel=4e-3)
+
+
 def test_a_check_with_an_unchanged_lamp_changes_nothing(small: Loaded, tmp_path: Path) -> None:
     with Record.create(tmp_path / "run", {}) as record:
         scan(small, record, upto=8)

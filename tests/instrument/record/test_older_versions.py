@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from instrument.record.record import Record
-from tests.support.storage.older_records import as_version_3
+from tests.support.storage.older_records import as_version
 from tests.support.storage.sample_records import reading, small_record
 
 
@@ -16,15 +18,16 @@ def contents(record: Record) -> list[object]:
     ]  # fmt: skip
 
 
-def test_a_record_of_version_3_holds_what_it_held_and_takes_more(tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", [3, 4])
+def test_an_older_record_holds_what_it_held_and_takes_more(tmp_path: Path, version: int) -> None:
     with small_record(tmp_path / "run") as record:
         before = contents(record)
-    as_version_3(tmp_path / "run")
+    as_version(tmp_path / "run", version)
     more = reading(5, signal_dn=float("nan"), flags="saturated")
     with Record.open(tmp_path / "run") as record:
-        assert record.meta("schema_version") == "3"
+        assert record.meta("schema_version") == str(version)
         assert contents(record) == before
         record.add_reading(more)
     with Record.open(tmp_path / "run") as record:
-        assert record.meta("schema_version") == "3"
+        assert record.meta("schema_version") == str(version)
         assert repr(record.readings()[-1]) == repr(more)

@@ -31,6 +31,7 @@ def database() -> Iterator[sqlite3.Connection]:
 DIGESTS = {
     3: "9f19a8226c2bf34aba7f2e90b0857037188d10962a30af3a6da4e589df4eeab4",
     4: "3ca133c29e7090078baff85f88ef8f3e97e1c13f0aecddd88d0414542926cf20",
+    5: "3ada554edb836b921d186084f62e71ed224ba3bf9c79a1c8216e84f3e90050cb",
 }
 
 
@@ -53,6 +54,7 @@ def test_a_reading_has_a_column_for_each_value_in_order() -> None:
     assert [column.name for column in schema.TABLES["reading"]] == values
     own = [f.name for f in fields(Check) if f.name != "reading"]
     assert [column.name for column in schema.TABLES["drift_at_resume"]] == own + values
+    assert schema.SQL.count("crc32 INTEGER NOT NULL") == len(schema.TABLES)
     types = {"INTEGER": "int", "REAL": "float", "TEXT": "str"}
     for column, field in zip(schema.TABLES["reading"], fields(Reading), strict=True):
         assert types[column.sql_type] == {"Kind": "str", "Surface": "str"}.get(
@@ -96,4 +98,4 @@ def test_a_value_that_is_not_allowed_cannot_be_written(
 
 def test_one_preview_has_at_most_128_mb(database: sqlite3.Connection) -> None:
     with pytest.raises(sqlite3.IntegrityError, match="png: bytes, at most 134217728"):
-        database.execute("INSERT INTO preview VALUES (0, '', zeroblob(134217729), '[]')")
+        database.execute("INSERT INTO preview VALUES (0, '', zeroblob(134217729), '[]', 0)")

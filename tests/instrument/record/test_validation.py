@@ -16,7 +16,7 @@ from tests.support.strangers.mutations import Mutator, feed
 from tests.support.strangers.run_folders import REFUSED, Sent, copy_of
 
 
-@pytest.fixture(params=[4, 3])
+@pytest.fixture(params=[5, 4, 3])
 def sent(tmp_path: Path, request: pytest.FixtureRequest) -> Sent:
     """A received small record, in each schema version."""
     small_record(tmp_path / "run").close()
@@ -51,7 +51,8 @@ def test_a_schema_with_fewer_rules_is_unknown(tmp_path: Path, old: str, new: str
 
 
 def test_a_schema_of_one_version_under_the_number_of_another_is_refused(sent: Sent) -> None:
-    sent.forge("UPDATE meta SET value = 7 - value WHERE key = 'schema_version'")
+    other = "CASE value WHEN '4' THEN '5' ELSE '4' END"
+    sent.forge(f"UPDATE meta SET value = {other} WHERE key = 'schema_version'")
     with pytest.raises(InputError, match="the table 'meta', which this program did not create"):
         Record.open(sent.folder)
 
@@ -105,7 +106,7 @@ def test_a_scan_of_60_000_points_with_a_drift_check_every_25_opens(tmp_path: Pat
     sent.sql(
         "DELETE FROM reading WHERE step > 0",
         "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 62400) "
-        f"INSERT INTO reading SELECT {', '.join(_numbered(name) for name in COLUMNS)} "
+        f"INSERT INTO reading SELECT {', '.join(_numbered(name) for name in COLUMNS)}, 0 "
         "FROM reading, n",
     )
     with Record.open(sent.folder) as record:

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from instrument.record.record import FILE_NAME
+from instrument.record.schema import SCHEMA_VERSION
 from tests.support.command import gonio
 from tests.support.paths import CONFIGS
-from tests.support.storage.older_records import as_version_3
+from tests.support.storage.older_records import as_version, seal_again
 
 SCRIPT = "<script>alert(1)</script>"
 
@@ -30,14 +31,15 @@ class Sent:
         return self.folder / FILE_NAME
 
     def sql(self, *statements: str) -> None:
-        """Run statements as any SQLite tool does, under the rules of the tables."""
+        """Run statements under the rules of the tables, and seal the rows again."""
         with closing(sqlite3.connect(self.record)) as database:
             for statement in statements:
                 database.execute(statement)
+            seal_again(database)
             database.commit()
 
     def forge(self, *statements: str) -> None:
-        """Run statements as if the tables had no rules, and restore the text of the schema."""
+        """Run statements as if the tables had no rules, then restore seals and schema."""
         with closing(sqlite3.connect(self.record, isolation_level=None)) as database:
             own = database.execute("SELECT sql, name FROM sqlite_schema WHERE sql IS NOT NULL")
             texts = own.fetchall()
@@ -46,6 +48,7 @@ class Sent:
             _write_schema(database, lax)
             for statement in statements:
                 database.execute(statement)
+            seal_again(database)
             _write_schema(database, texts)
 
     def widen(self, old: str, new: str) -> None:
@@ -78,13 +81,13 @@ def run_few_points(folder: Path) -> Path:
     return folder / "run"
 
 
-def copy_of(run: Path, to: Path, version: int = 4) -> Sent:
+def copy_of(run: Path, to: Path, version: int = SCHEMA_VERSION) -> Sent:
     """Copy a run into a folder of `to`, its record in that schema version."""
     shutil.copytree(run, to / "sent")
     victim = to / "mine.txt"
     victim.write_text("my own\n")
-    if version == 3:
-        as_version_3(to / "sent")
+    if version != SCHEMA_VERSION:
+        as_version(to / "sent", version)
     return Sent(to / "sent", victim)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from instrument.record.record import Record
 from tests.support.command import gonio
-from tests.support.storage.older_records import as_version_3
+from tests.support.storage.older_records import as_version
 from tests.support.strangers.run_folders import Sent, run_few_points
 
 
@@ -30,13 +30,15 @@ def results(run: Path) -> tuple[list[list[str]], object]:
     )
 
 
-@pytest.mark.parametrize("command", [("report",), ("resume", "--yes")])
-def test_a_run_of_version_3_gives_the_same_results(
-    run: Path, tmp_path: Path, command: tuple[str, ...]
+@pytest.mark.parametrize(
+    ("command", "version"), [(("report",), 3), (("resume", "--yes"), 3), (("resume", "--yes"), 4)]
+)
+def test_a_run_of_an_older_version_gives_the_same_results(
+    run: Path, tmp_path: Path, command: tuple[str, ...], version: int
 ) -> None:
     old = tmp_path / "old"
     shutil.copytree(run, old)
-    as_version_3(old)
+    as_version(old, version)
     if command[0] == "resume":
         tables = ("reading", "preview", "frame")
         Sent(old, old).sql(*(f"DELETE FROM {table} WHERE step >= 7" for table in tables))
@@ -46,6 +48,6 @@ def test_a_run_of_version_3_gives_the_same_results(
     assert done.returncode == 0, done.stderr
     assert results(old) == results(run)
     with Record.open(old) as record, Record.open(run) as whole:
-        assert record.meta("schema_version") == "3"
-        assert whole.meta("schema_version") == "4"
+        assert record.meta("schema_version") == str(version)
+        assert whole.meta("schema_version") == "5"
         assert len(record.readings()) == len(whole.readings()) > 7
