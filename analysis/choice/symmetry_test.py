@@ -75,6 +75,8 @@ def symmetry(m: Measurements, smooth: Brdf, noise: float) -> Symmetry:
     white = C.whiten(difference)
     chi2 = float(white @ white)
     p = probability(chi2, len(pairs))
+    if np.sum(total) <= 0:  # no light in the pairs, so nothing to compare an asymmetry with
+        return Symmetry("undecided", len(pairs), 0.0, p)
     u = float(np.linalg.norm(C.common.sum(axis=0))) ** 2 + float(np.sum(C.variance))
     outcome = _outcome(p, total, math.sqrt(u) / float(np.sum(np.abs(total))))
     return Symmetry(outcome, len(pairs), float(np.mean(difference) / np.mean(total)), p)

@@ -190,3 +190,13 @@ def test_smooth_is_said_only_where_an_asymmetry_would_have_been_found(
     bare = Measurements.bare(m.theta_i_deg, m.theta_r_deg, m.dphi_deg, m.brdf)
     found = symmetry(bare, brdf_of("lambert", {"albedo": 0.8}), noise)
     assert found.outcome == outcome
+
+
+@pytest.mark.parametrize("level", [0.0, -1e-3])
+def test_pairs_without_light_have_no_asymmetry(level: float) -> None:
+    """As where the only mirrored views are at grazing angles, or in an all but dark table."""
+    m = scan("lambert", 1, albedo=0.8)
+    dark = replace(m, brdf=np.full(m.size, level))
+    found = symmetry(dark, brdf_of("lambert", {"albedo": 0.8}), 0.1)
+    assert (found.outcome, found.asymmetry) == ("undecided", 0.0)
+    assert found.pairs > 0
