@@ -59,7 +59,7 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
 
     `yes`: the rig may move, without asking the operator.
     """
-    with Record.open(folder) as record:
+    with Record.open(folder, claim=True) as record:
         write_run_inputs(record)
         loaded = load_run_inputs(record)
         plan = make_plan(loaded)
@@ -69,10 +69,9 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
             # Raises, before anything moves, where no way leads to the first missing pose.
             moves_between(home_pose(loaded.rig), missing[0].pose, loaded.rig)
             check_ready(loaded)
-            with record.claimed():
-                _confirm(yes, len(missing), record)
-                _remove_damaged(record)
-                scan(loaded, plan, record, progress)
+            _confirm(yes, len(missing), record)
+            _remove_damaged(record)
+            scan(loaded, plan, record, progress)
         _finish(record, loaded, as_json)
 
 

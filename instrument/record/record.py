@@ -7,10 +7,8 @@ computed from them afterwards, so the raw data of every value are kept.
 
 from __future__ import annotations
 
-import fcntl
 import json
 import math
-import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -21,6 +19,8 @@ from typing import Any
 from instrument.closeable import Closeable
 from instrument.devices import Frame
 from instrument.errors import GonioError, InputError, StorageError
+from instrument.record.database_files import create_file, is_same, path_of, remove_database
+from instrument.record.folder_lock import FolderLock
 from instrument.record.network_share import network_share
 from instrument.record.reading import Check, Preview, Reading
 from instrument.record.schema import (
@@ -37,8 +37,8 @@ from instrument.record.write_lock import begin_writing, held_by_another, is_busy
 from instrument.text.atomic_file import disk_full, explain_os_error, make_folder, sync_folder
 
 FILE_NAME = "record.sqlite"
-LOCK_NAME = ".scanning"
 _NAMES = {table: [c.name for c in columns] for table, columns in TABLES.items()}
+_TAKEN = "--out must be absent or an empty folder: name another, or leave it out"
 _NOT_PERMITTED = ("SQLITE_READONLY", "SQLITE_PERM", "SQLITE_CANTOPEN")
 
 
@@ -48,44 +48,47 @@ class Record(Closeable):
     Rows that were damaged since they were written are left out of everything that it returns.
     """
 
-    def __init__(self, connection: sqlite3.Connection, folder: Path) -> None:
+    def __init__(
+        self, connection: sqlite3.Connection, folder: Path, lock: FolderLock | None = None
+    ) -> None:
         self._db = connection
-        self.folder = folder
+        self.folder, self._lock = folder, lock
         self._file = (folder / FILE_NAME).stat()
         self._version = SCHEMA_VERSION
         self._damaged: Damaged = {}
 
     @classmethod
     def create(cls, folder: Path, meta: Mapping[str, str]) -> Record:
-        """Create a record in `folder`, which must be absent or empty; else `InputError`."""
+        """Create a record in `folder`, which must be absent or empty; else `InputError`.
+
+        The folder is locked against a second scan until the record is closed, or `claimed` ends.
+        """
         _require_support(folder)
-        try:
-            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-                raise InputError(
-                    f"{folder}: --out must be absent or an empty folder: name another, or leave "
-                    "it out"
-                )
-            make_folder(folder)
-            database = connect(folder / FILE_NAME)
-            _begin(database, meta)
-            sync_folder(folder)
-        except (OSError, sqlite3.Error) as error:
-            why = _explain(error, folder)
-            _remove_unbegun(folder)
-            raise InputError(f"{folder}: no run can be written there: {why}") from error
-        return cls(database, folder)
+        with ExitStack() as on_failure:
+            try:
+                record = _created(folder, meta, on_failure)
+            except (OSError, sqlite3.Error) as error:
+                why = _explain(error, folder)
+                raise InputError(f"{folder}: no run can be written there: {why}") from error
+            on_failure.pop_all()
+        return record
 
     @classmethod
-    def open(cls, folder: Path) -> Record:
-        """Open the record of an earlier run; `InputError` if it is missing, damaged or foreign."""
+    def open(cls, folder: Path, *, claim: bool = False) -> Record:
+        """Open the record of an earlier run; `InputError` if it is missing, damaged or foreign.
+
+        `claim`: lock the folder against a second scan, before anything is read and until the record
+        is closed; `InputError` names the process that holds the lock.
+        """
         _require_support(folder)
         path = folder / FILE_NAME
         if not path.is_file():
             raise InputError(f"{folder}: {_no_run(folder)}")
-        check_files(folder, FILE_NAME, LOCK_NAME)
         with ExitStack() as on_failure:
+            lock = on_failure.enter_context(FolderLock(folder)) if claim else None
+            check_files(folder, FILE_NAME)
             try:
-                record = on_failure.enter_context(cls(connect(path), folder))
+                record = on_failure.enter_context(cls(connect(path), folder, lock))
                 record._version = check_schema(record._db, path)
                 record._damaged = check_values(record._db, path, record._version)
             except (sqlite3.Error, UnicodeDecodeError) as error:  # names and texts of any bytes
@@ -99,27 +102,19 @@ class Record(Closeable):
 
         Raises `InputError` that names the process which holds it.
         """
-        with (self.folder / LOCK_NAME).open("a+") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                lock.seek(0)
-                raise InputError(
-                    f"{self.folder}: process {lock.read().strip()} is scanning into this run: "
-                    "wait for its end, or stop it"
-                ) from error
-            lock.truncate(0)
-            lock.write(str(os.getpid()))
-            lock.flush()
+        lock, self._lock = self._lock or FolderLock(self.folder), None
+        with lock:
             yield
 
     def close(self) -> None:
-        """Close the file; may be called twice."""
+        """Close the file and release the lock; may be called twice."""
         self._db.close()
+        if self._lock is not None:
+            self._lock.close()
 
     def current_folder(self) -> Path | None:
         """Return the folder that holds the record's file now, even if moved; None if removed."""
-        found = _path_of(self._file)
+        found = path_of(self._file)
         return found.parent if found is not None and found.is_file() else None
 
     def meta(self, key: str) -> str | None:
@@ -279,11 +274,11 @@ class Record(Closeable):
         """Raise `StorageError` if the file was moved or removed: later rows would be lost."""
         path = self.folder / FILE_NAME
         try:
-            same = _same(path.stat(), self._file)
+            same = is_same(path.stat(), self._file)
         except OSError:
             same = False
         if not same:
-            raise StorageError(f"{path}: {_absence(self._file)}")
+            raise StorageError(f"{path}: {_absence(path_of(self._file))}")
 
 
 def _begin(database: sqlite3.Connection, meta: Mapping[str, str]) -> None:
@@ -304,34 +299,33 @@ def _refusal(error: Exception, path: Path) -> GonioError:
     return InputError(f"{path}: not a record of this program: {error}")
 
 
-def _same(one: os.stat_result, other: os.stat_result) -> bool:
-    return (one.st_dev, one.st_ino) == (other.st_dev, other.st_ino)
-
-
-def _path_of(file: os.stat_result) -> Path | None:
-    """Return the current path of a file that this process has open; no such path: removed."""
-    for link in Path("/proc/self/fd").iterdir():
-        try:
-            if _same(link.stat(), file):
-                return link.readlink()
-        except OSError:
-            continue  # the descriptor of the listing itself, closed by now
-    return None
-
-
-def _absence(file: os.stat_result) -> str:
-    """Explain why the record's file is no longer where it was."""
-    now = _path_of(file)
+def _absence(now: Path | None) -> str:
+    """Explain why the record's file is no longer where it was; `now`: its path, if it has one."""
     if now is None or not now.is_file():
         return "was removed while the scan ran, and the readings with it: run again"
     return "was moved while the scan ran: nothing accepted is lost"
 
 
-def _remove_unbegun(folder: Path) -> None:
-    """Remove the files of a record that could not be begun, so that `folder` can be used again."""
-    for name in (FILE_NAME, f"{FILE_NAME}-wal", f"{FILE_NAME}-shm", f"{FILE_NAME}-journal"):
-        with suppress(OSError):
-            (folder / name).unlink()
+def _created(folder: Path, meta: Mapping[str, str], on_failure: ExitStack) -> Record:
+    """Return a new record; what has been made of it is removed by `on_failure`, under the lock."""
+    path, made = folder / FILE_NAME, not folder.exists()
+    if not (made or folder.is_dir()):
+        raise InputError(f"{folder}: {_TAKEN}")
+    make_folder(folder)
+    lock = on_failure.enter_context(FolderLock(folder))
+    if any(folder.iterdir()):
+        raise InputError(f"{folder}: {_TAKEN}")
+    if made:
+        on_failure.callback(_remove_empty, folder)
+    on_failure.callback(remove_database, path, create_file(path))
+    database = connect(path)
+    on_failure.callback(database.close)
+    _begin(database, meta)
+    sync_folder(folder)
+    return Record(database, folder, lock)
+
+
+def _remove_empty(folder: Path) -> None:
     with suppress(OSError):
         folder.rmdir()
 

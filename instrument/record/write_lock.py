@@ -6,12 +6,13 @@ A person who looks into the record with a table editor holds the lock until a ch
 from __future__ import annotations
 
 import logging
+import os
 import sqlite3
 from pathlib import Path
 
 from instrument.clock import Clock, SystemClock
 from instrument.errors import StorageError
-from instrument.record.lock_holder import lock_holder
+from instrument.processes import locking, named, opened_by
 
 log = logging.getLogger(__name__)
 
@@ -19,6 +20,9 @@ PATIENCE_S = 60.0  # longer than a person needs to press Save
 NOTICE_S = 2.0  # after which the wait is logged
 TRY_S = 0.1  # of SQLite's own wait, during which no signal is handled
 _PAUSE_S = 0.02
+# SQLite's write-ahead log: the writer locks this byte of the file NAME-shm (WAL_WRITE_LOCK in
+# "WAL-mode File Format", section 2.3.1, and UNIX_SHM_BASE in os_unix.c of SQLite).
+_WRITE_LOCK = 120
 
 
 def is_busy(error: sqlite3.Error) -> bool:
@@ -55,3 +59,18 @@ def held_by_another(path: Path, since: str = "") -> str:
         f"{path}: {lock_holder(path)} holds the record{since and ' '}{since}: save or discard the "
         "changes there, or close it"
     )
+
+
+def lock_holder(path: Path) -> str:
+    """Return the process that holds the record's write lock, in words with its number.
+
+    Where Linux does not show it: the processes that have the file open, or "another program".
+    """
+    own = os.getpid()
+    holders = [pid for pid in locking(Path(f"{path}-shm"), _WRITE_LOCK) if pid != own]
+    if holders:
+        return ", ".join(map(named, holders))
+    users = [pid for pid in opened_by(path) if pid != own]
+    if users:
+        return f"one of those that have it open: {', '.join(map(named, users))}"
+    return "another program"

@@ -216,7 +216,6 @@ REFUSED: dict[str, tuple[Callable[[Sent], None], str]] = {
     "a link as the record": (lambda sent: sent.link(FILE_NAME), "is a link or no file"),
     "a link as its log": (lambda sent: sent.link(f"{FILE_NAME}-wal"), "is a link or no file"),
     "a link as its index": (lambda sent: sent.link(f"{FILE_NAME}-shm"), "is a link or no file"),
-    "a link as the lock": (lambda sent: sent.link(".scanning"), "is a link or no file"),
     "a journal": (
         lambda sent: (sent.folder / f"{FILE_NAME}-journal").write_bytes(b"x"),
         "-journal: stopped before the record had begun",
