@@ -12,7 +12,7 @@ from acquisition.commands.determinable import Determinable
 from acquisition.commands.fit_status import no_fit_reported, print_json, require_result
 from acquisition.commands.scan_session import scan
 from acquisition.commands.views import print_outcome, print_plan
-from acquisition.engine.frame_files import require_disk_space
+from acquisition.engine.frame_files import require_disk_space, require_own_folder
 from acquisition.engine.resume import Progress
 from acquisition.plan.moves import moves_between
 from acquisition.plan.plan import Plan, make_plan
@@ -69,6 +69,7 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
             # Raises, before anything moves, where no way leads to the first missing pose.
             moves_between(home_pose(loaded.rig), missing[0].pose, loaded.rig)
             check_ready(loaded)
+            require_own_folder(loaded, folder)
             _confirm(yes, len(missing), record)
             _remove_damaged(record)
             scan(loaded, plan, record, progress)

@@ -18,7 +18,7 @@ FOLDER = "frames"
 def write_frames(frames: Sequence[Frame], step: int, run: Path) -> list[str]:
     """Write raw counts as TIFF into the run's folder; return the names relative to it.
 
-    Raises `StorageError` if a file cannot be written.
+    Raises `StorageError` if a file cannot be written, or would be written outside the run.
     """
     import cv2
 
@@ -26,10 +26,23 @@ def write_frames(frames: Sequence[Frame], step: int, run: Path) -> list[str]:
     try:
         make_folder(run / FOLDER)
         for name, frame in zip(names, frames, strict=True):
-            write_whole(run / name, cv2.imencode(".tiff", frame.image)[1].tobytes())
+            data = cv2.imencode(".tiff", frame.image)[1].tobytes()
+            write_whole(run / name, data, linked_folder=False)
     except OSError as error:
         raise StorageError(f"{run / FOLDER}: {explain_os_error(error, run)}") from error
     return names
+
+
+def require_own_folder(loaded: Loaded, run: Path) -> None:
+    """Raise `InputError` if frames are kept and their folder is a link or no folder.
+
+    The run may come from anybody, and its frames would be written wherever the link leads.
+    """
+    path = run / FOLDER
+    if loaded.protocol.keep_frames and (path.is_symlink() or (path.exists() and not path.is_dir())):
+        raise InputError(
+            f"{path}: is a link or no folder; allowed: a folder, or nothing: move it away"
+        )
 
 
 def frame_bytes(plan: Plan, loaded: Loaded) -> int:

@@ -30,6 +30,12 @@ _DASHES: tuple[Dashes, ...] = (
 )
 INK, GREY, GRID, BAND = "#222222", "#666666", "#DDDDDD", "#ECECEC"
 
+# The page may load nothing and run nothing, also if a text of a run should ever get past `escaped`.
+_POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
+    "form-action 'none'"
+)
+
 _WIDTH_IN = 9.6
 
 _FLOAT_DIGITS = 15  # significant decimal digits that every float keeps
@@ -157,6 +163,7 @@ def html_page(title: str, css: str, body: Iterable[str]) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         f"<title>{title}</title>\n<style>{css}</style>\n</head>\n<body>\n"
         + "\n".join(part for part in body if part)
         + "\n</body>\n</html>\n"

@@ -14,27 +14,40 @@ from instrument.errors import StorageError
 _FORBIDDEN = (errno.EROFS, errno.EACCES, errno.EPERM)
 
 
-def write_whole(path: Path, content: str | bytes) -> None:
+def write_whole(path: Path, content: str | bytes, *, linked_folder: bool = True) -> None:
     """Write bytes, or text as UTF-8, under a temporary name, flush to disk, then rename.
 
-    A reader of `path` sees the old file or the whole new one, also after a power cut.
-    Raises `StorageError`.
+    A reader of `path` sees the old file or the whole new one, also after a power cut. A link under
+    the file's name is replaced; `linked_folder`: its folder may be a link. Raises `StorageError`.
     """
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    data = content if isinstance(content, bytes) else content.encode("utf-8", "replace")
+    follow = 0 if linked_folder else os.O_NOFOLLOW
     try:
-        part.unlink(missing_ok=True)  # it may be a link to another file
-        data = content if isinstance(content, bytes) else content.encode("utf-8", "replace")
-        with part.open("xb") as file:
+        folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | follow)
+        try:
+            _write_in(folder, path.name, data)
+        finally:
+            os.close(folder)
+    except OSError as error:
+        raise StorageError(f"{path}: {explain_os_error(error, path.parent)}") from error
+
+
+def _write_in(folder: int, name: str, data: bytes) -> None:
+    """Write a file of an open folder, which stays the same whatever happens to its path."""
+    part = f".{name}.{os.getpid()}.part"
+    try:
+        with suppress(FileNotFoundError):
+            os.unlink(part, dir_fd=folder)  # it may be a link to another file
+        create = os.O_WRONLY | os.O_CREAT | os.O_EXCL
+        with os.fdopen(os.open(part, create, 0o666, dir_fd=folder), "wb") as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        part.replace(path)
-        sync_folder(path.parent)
-    except OSError as error:
-        raise StorageError(f"{path}: {explain_os_error(error, path.parent)}") from error
+        os.replace(part, name, src_dir_fd=folder, dst_dir_fd=folder)
+        os.fsync(folder)
     finally:
         with suppress(OSError):  # the error that matters is the first one
-            part.unlink(missing_ok=True)
+            os.unlink(part, dir_fd=folder)
 
 
 def explain_os_error(error: OSError, folder: Path) -> str:

@@ -8,9 +8,9 @@ from pathlib import Path
 import cv2
 import pytest
 
-from acquisition.engine.frame_files import frame_bytes, require_disk_space
+from acquisition.engine.frame_files import frame_bytes, require_disk_space, require_own_folder
 from acquisition.plan.plan import make_plan
-from instrument.errors import InputError
+from instrument.errors import InputError, StorageError
 from instrument.record.record import Record
 from tests.support.scans import changed, small_scan
 from tests.support.whole_scans.stopped_scan import scan
@@ -44,3 +44,19 @@ def test_kept_frames_are_whole_and_named_in_the_record(tmp_path: Path) -> None:
     assert image.shape == (LOADED.rig.camera.height_px, LOADED.rig.camera.width_px)
     assert image.dtype == "uint16"
     assert image.max() >= readings[0].peak_dn
+
+
+def test_frames_are_never_written_through_a_link(tmp_path: Path) -> None:
+    """In a run from elsewhere it could lead anywhere; a link to a file too."""
+    (tmp_path / "outside").mkdir()
+    with Record.create(tmp_path / "run", {}) as record:
+        (tmp_path / "run" / "frames").symlink_to(tmp_path / "outside")
+        with pytest.raises(InputError, match="frames: is a link or no folder; allowed: a folder"):
+            require_own_folder(LOADED, record.folder)
+        with pytest.raises(StorageError, match=r"frames.*cannot be written"):
+            scan(LOADED, record)
+        assert record.readings() == []
+        (tmp_path / "run" / "frames").unlink()
+        scan(LOADED, record, upto=1)
+        require_own_folder(LOADED, record.folder)
+    assert list((tmp_path / "outside").iterdir()) == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -32,6 +33,17 @@ class TestPage:
         assert set(re.findall(r"https?://[^\s\"'<)]+", page)) == {"http://www.w3.org/2000/svg"}
         assert set(re.findall(r'(?:src|href)="(.)', page)) <= {"#", "d"}
         assert not re.search(r"<script|<link|@import|url\((?!#)|\son\w+=", page)
+
+    def test_its_policy_forbids_scripts_and_loading_anything(self, page: str) -> None:
+        """It comes before all that it governs."""
+        policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]+)"', page)
+        assert policy is not None
+        rules = dict(rule.split(" ", 1) for rule in policy[1].split("; "))
+        assert rules["default-src"] == "'none'"
+        assert rules["style-src"] == "'unsafe-inline'"
+        assert rules["img-src"] == "data:"
+        assert "script-src" not in rules
+        assert policy.start() < page.index("<title>") < page.index("<style>")
 
     @pytest.mark.parametrize(
         "section",
@@ -143,10 +155,10 @@ class TestFile:
         path = tmp_path / "report.html"
         path.write_text("old")
 
-        def full(self: Path, _: Path) -> None:
+        def full(*_: object, **__: object) -> None:
             raise OSError(errno.ENOSPC, "no space left on device")
 
-        monkeypatch.setattr(Path, "replace", full)
+        monkeypatch.setattr(os, "replace", full)
         with pytest.raises(StorageError, match=r"report\.html: the disk is full"):
             write_report(path, without_tile())
         assert path.read_text() == "old"

@@ -142,6 +142,48 @@ static void synced(int fd) {
 int fsync(int fd) { int done = REAL(fsync)(fd); if (done == 0) synced(fd); return done; }
 int fdatasync(int fd) { int done = REAL(fdatasync)(fd); if (done == 0) synced(fd); return done; }
 
+/* Path of a name in an open folder, as SQLite and Python's path functions give it. */
+static const char *in_folder(int folder, const char *name, char *path) {
+    char link[64], own[PATH_MAX];
+    if (folder == AT_FDCWD || *name == '/') return name;
+    snprintf(link, sizeof link, "/proc/self/fd/%d", folder);
+    ssize_t n = readlink(link, own, sizeof own - 1);
+    if (n <= 0) return name;
+    snprintf(path, 2 * PATH_MAX, "%.*s/%s", (int)n, own, name);
+    return path;
+}
+
+#define OPENAT(name)                                            \
+    int name(int folder, const char *file, int flags, ...) {    \
+        va_list more;                                           \
+        va_start(more, flags);                                  \
+        mode_t mode = flags & (O_CREAT | O_TMPFILE) ? va_arg(more, int) : 0; \
+        va_end(more);                                           \
+        char buffer[2 * PATH_MAX];                              \
+        const char *path = in_folder(folder, file, buffer);     \
+        int known = access(path, F_OK) == 0;                    \
+        if ((flags & (O_WRONLY | O_RDWR)) && read_only(path)) return -1;  \
+        return opened(REAL(name)(folder, file, flags, mode), path, known, flags); \
+    }
+OPENAT(openat)
+OPENAT(openat64)
+
+int renameat(int from_folder, const char *from, int to_folder, const char *to) {
+    char old[2 * PATH_MAX], new[2 * PATH_MAX];
+    const char *old_path = in_folder(from_folder, from, old);
+    const char *new_path = in_folder(to_folder, to, new);
+    if (read_only(new_path)) return -1;
+    if (below_root(new_path)) entry(RENAME, 0, 0, 0, old_path, new_path, "", 0);
+    return REAL(renameat)(from_folder, from, to_folder, to);
+}
+int unlinkat(int folder, const char *name, int flags) {
+    char buffer[2 * PATH_MAX];
+    const char *path = in_folder(folder, name, buffer);
+    if (read_only(path)) return -1;
+    if (below_root(path) && access(path, F_OK) == 0) entry(UNLINK, 0, 0, 0, path, "", "", 0);
+    return REAL(unlinkat)(folder, name, flags);
+}
+
 int rename(const char *from, const char *to) {
     if (read_only(to)) return -1;
     if (below_root(to)) entry(RENAME, 0, 0, 0, from, to, "", 0);
