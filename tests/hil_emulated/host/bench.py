@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from instrument.clock import SystemClock
 from instrument.closeable import Closeable
-from instrument.config.axes import AXES, Wired
+from instrument.config.axes import Wired
 from instrument.config.camera import CameraConfig, CameraDefects, V4l2CameraConfig
 from instrument.config.load import Loaded
 from instrument.devices import Surface
@@ -24,9 +24,11 @@ from sim.emulated.bench import EmulatedBench
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.newport_controller import NewportController
 from sim.emulated.usb.acm_port import AcmWire
+from sim.emulated.usb.device import UsbDevice
 from sim.emulated.usb.server import UsbIpServer
 from sim.emulated.usb.uvc_camera import UvcCamera
 from sim.emulated.v4l2.device import CameraFaults, Capabilities, EmulatedCamera, Exposure
+from sim.emulated.wire import Controller
 from sim.emulated.zaber_controller import ZaberController
 from sim.scene.scene import Scene
 from tests.hil_emulated.host.computer import Computer
@@ -35,6 +37,7 @@ from tests.support.command import gonio
 from tests.support.whole_scans.simulated_rig import Points, points, simulated
 
 Look = Literal["levels", "surface", "scene"]
+ADAPTERS = ("SMC100", "AZ", "X-RSW")
 SPARE = Mechanics(speed_deg_per_s=40.0, acceleration_deg_per_s2=80.0, homing_s=0.5)
 _LOOK_S = 0.01
 SIZES = ((160, 128), (320, 240), (640, 480))
@@ -52,26 +55,28 @@ class HostBench(Closeable):
         self.computer: Computer | None = None
         self._scene = Scene.of(loaded.rig, loaded.protocol)
         self._scene.use_clock(SystemClock())
-        self._bench = EmulatedBench(self._scene, SystemClock())
-        axes = {n: a for n in AXES if isinstance(a := loaded.rig.axes[n], Wired)}
-        own = {name: self._bench.controller(name, axis) for name, axis in axes.items()}
-        self.motors = {**self._bench.motors, "X-RSW": _spare(), "SMC100-ACM": _spare()}
-        adapters = {"SMC100": own["theta_i"], "AZ": own["dphi"],
-                    "X-RSW": ZaberController(self.motors["X-RSW"])}  # fmt: skip
-        self.adapters = {name: folder / name for name in adapters}
-        for name, controller in adapters.items():
-            self._closing.enter_context(SocketWire([controller], self.adapters[name]))
+        bench = EmulatedBench(self._scene, SystemClock())
+        controllers = _controllers(bench, loaded)
+        spares = {"X-RSW": _spare(), "SMC100-ACM": _spare()}
+        self.motors = {**bench.motors, **spares}
+        controllers["X-RSW"] = ZaberController(spares["X-RSW"])
+        controllers["SMC100-ACM"] = NewportController(spares["SMC100-ACM"])
         config = loaded.rig.camera
         assert isinstance(config, V4l2CameraConfig)
-        self.camera = _ThreeLooks(config, self._bench.camera(config))
-        spare = NewportController(self.motors["SMC100-ACM"])
-        ports = [
-            self._closing.enter_context(AcmWire([controller], serial=name))
-            for name, controller in (("ZABER", own["theta_r"]), ("SMC100-ACM", spare))
-        ]
+        self.camera = _ThreeLooks(config, bench.camera(config))
+        self.adapters = {name: folder / name for name in ADAPTERS}
+        for name, path in self.adapters.items():
+            self._closing.enter_context(SocketWire([controllers[name]], path))
+        self.usb = self._closing.enter_context(UsbIpServer(self._usb_devices(controllers)))
+
+    def _usb_devices(self, controllers: Mapping[str, Controller]) -> dict[str, UsbDevice]:
+        """Connect the devices with a USB plug of their own; return them by bus id."""
         camera = UvcCamera(self.camera.device, rates=(20, 10, 5), serial="CAMERA")
-        devices = {"1-1": camera, "1-2": ports[0].device, "1-3": ports[1].device}
-        self.usb = self._closing.enter_context(UsbIpServer(devices))
+        devices: dict[str, UsbDevice] = {"1-1": camera}
+        for bus_id, name in (("1-2", "ZABER"), ("1-3", "SMC100-ACM")):
+            wire = self._closing.enter_context(AcmWire([controllers[name]], serial=name))
+            devices[bus_id] = wire.device
+        return devices
 
     def close(self) -> None:
         """Disconnect all devices."""
@@ -158,6 +163,16 @@ class HostBench(Closeable):
             done = gonio("run", self._loaded.protocol_path, "--rig", rig, "--out", folder / "run")
             assert done.returncode == 0, done.stderr
             return points(folder / "run")
+
+
+def _controllers(bench: EmulatedBench, loaded: Loaded) -> dict[str, Controller]:
+    """Return the controllers of the rig's axes, by the serial number of their port."""
+    found: dict[str, Controller] = {}
+    for name, serial in (("theta_i", "SMC100"), ("dphi", "AZ"), ("theta_r", "ZABER")):
+        axis = loaded.rig.axes[name]
+        assert isinstance(axis, Wired)
+        found[serial] = bench.controller(name, axis)
+    return found
 
 
 def _spare() -> Motor:

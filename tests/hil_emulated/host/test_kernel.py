@@ -68,7 +68,7 @@ def test_the_newest_kernel_that_has_all_modules_is_found(tmp_path: Path) -> None
     """6.10 is newer than 6.9, and a cloud kernel has no cameras."""
     for version in ("6.9.7-amd64", "6.10.2-amd64", "5.10.0-30-amd64"):
         write_kernel(tmp_path, version, everything())
-    cloud = {name: [] for name in everything() if name != "uvcvideo"}
+    cloud: dict[str, list[str]] = {name: [] for name in everything() if name != "uvcvideo"}
     write_kernel(tmp_path, "6.12.1-cloud-amd64", cloud)
     found = installed_kernel(tmp_path / "boot", tmp_path / "modules")
     assert found is not None

@@ -32,10 +32,10 @@ from sim.faults.faults import Faults
 from sim.faults.triggers import Triggers, When
 from sim.scene.scene import Scene
 from sim.scene.sensor import Sensor
-from tests.support import faulty_scan
 from tests.support.paths import CONFIGS
 from tests.support.scans import changed, small_scan
 from tests.support.v4l2.remote_camera import QUICK, SETTINGS, RemoteCamera
+from tests.support.whole_scans import faulty_scan
 from tests.support.whole_scans.faulty_scan import ScanResult, WatchedDevice, require_reported
 
 pytestmark = pytest.mark.waits

@@ -30,9 +30,9 @@ from sim.emulated.wire import Fault
 from sim.faults.faults import Faults
 from sim.faults.triggers import Triggers, When
 from sim.scene.scene import Scene
-from tests.support import faulty_scan
 from tests.support.scans import changed, small_scan
 from tests.support.stages.emulated_stages import EMULATED_STAGES, EmulatedStage
+from tests.support.whole_scans import faulty_scan
 from tests.support.whole_scans.faulty_scan import ScanResult, WatchedDevice, require_reported
 
 pytestmark = pytest.mark.waits

@@ -20,8 +20,8 @@ from instrument.record.reading import Reading
 from instrument.record.record import Record
 from sim.faults.faults import FAULTS, Faults
 from sim.faults.triggers import When
-from tests.support import faulty_scan
 from tests.support.scans import small_scan, undated
+from tests.support.whole_scans import faulty_scan
 from tests.support.whole_scans.faulty_scan import ScanResult, Trigger, require_reported
 
 
