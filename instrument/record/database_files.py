@@ -1,13 +1,66 @@
-"""Files of a record's database: made by this process, known again, removed only if its own."""
+"""Files of a record's database: made by this process, known again, removed only if its own.
+
+Beside the database stand its write-ahead log NAME-wal, with the latest rows, and its index
+NAME-shm, with the locks. A process that has them open does not notice if they are removed, and its
+rows end with it. The numbers are those of SQLite's "WAL-mode File Format", sections 1.2 and 2.1.
+"""
 
 from __future__ import annotations
 
 import os
+import struct
 from contextlib import suppress
 from pathlib import Path
 
 SIDE_FILES = ("-wal", "-shm")
-"""Ends of the names of the write-ahead log and its index, which stand beside the database."""
+_WAL_HEADER, _FRAME_HEADER = 32, 24  # bytes
+_INDEX_BLOCK = 32768  # bytes: the least that the index has
+
+
+class SideFiles:
+    """Write-ahead log and index that a connection has open, by their identity."""
+
+    def __init__(self, database: Path) -> None:
+        self._log, self._index = (Path(f"{database}{end}") for end in SIDE_FILES)
+        both = (self._log, self._index)
+        self._own = {path: path.stat() for path in both if path.exists()}  # not of a foreign file
+
+    def loss(self) -> str:
+        """Return which file was removed, replaced or cut, in words; empty if none was."""
+        for path, own in self._own.items():
+            try:
+                if not is_same(path.lstat(), own):
+                    return f"{path} was replaced"
+            except OSError:
+                return f"{path} was removed"
+        return next((f"{path} was cut" for path in self._own if self._is_cut(path)), "")
+
+    def restore(self) -> bool:
+        """Make what is left usable for SQLite; return False if rows of the log are lost.
+
+        A cut log is read again as after a crash, since its index is made empty: its whole rows
+        count, up to the cut. An index that was cut itself gets its size again, since to touch
+        memory beyond the end of its file would end the process.
+        """
+        cut = [path for path in self._own if path.exists() and self._is_cut(path)]
+        own = self._own.get(self._index)
+        if cut and own is not None and self._index.exists() and is_same(self._index.lstat(), own):
+            size = max(own.st_size, self._index.stat().st_size, _INDEX_BLOCK)
+            for length in (0, size):
+                os.truncate(self._index, length)
+        return self._log not in cut
+
+    def _is_cut(self, path: Path) -> bool:
+        size = path.stat().st_size
+        if path == self._index:
+            return size < _INDEX_BLOCK
+        try:
+            with self._index.open("rb") as file:
+                page_bytes, frames = struct.unpack("=14xHI", file.read(20))
+        except (OSError, struct.error):
+            return False  # without its index the log cannot be judged
+        page_bytes = 65536 if page_bytes == 1 else page_bytes
+        return bool(frames) and size < _WAL_HEADER + frames * (_FRAME_HEADER + page_bytes)
 
 
 def create_file(path: Path) -> os.stat_result:

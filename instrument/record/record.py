@@ -19,7 +19,13 @@ from typing import Any
 from instrument.closeable import Closeable
 from instrument.devices import Frame
 from instrument.errors import GonioError, InputError, StorageError
-from instrument.record.database_files import create_file, is_same, path_of, remove_database
+from instrument.record.database_files import (
+    SideFiles,
+    create_file,
+    is_same,
+    path_of,
+    remove_database,
+)
 from instrument.record.folder_lock import FolderLock
 from instrument.record.network_share import network_share
 from instrument.record.reading import Check, Preview, Reading
@@ -38,6 +44,8 @@ from instrument.text.atomic_file import disk_full, explain_os_error, make_folder
 
 FILE_NAME = "record.sqlite"
 _NAMES = {table: [c.name for c in columns] for table, columns in TABLES.items()}
+_SAVED = "the accepted readings have been moved into the database and are safe"
+_LOST = "the latest readings, which only it held, are lost and have to be measured again"
 _TAKEN = "--out must be absent or an empty folder: name another, or leave it out"
 _NOT_PERMITTED = ("SQLITE_READONLY", "SQLITE_PERM", "SQLITE_CANTOPEN")
 
@@ -56,6 +64,7 @@ class Record(Closeable):
         self._file = (folder / FILE_NAME).stat()
         self._version = SCHEMA_VERSION
         self._damaged: Damaged = {}
+        self._side_files = SideFiles(folder / FILE_NAME)
 
     @classmethod
     def create(cls, folder: Path, meta: Mapping[str, str]) -> Record:
@@ -259,7 +268,7 @@ class Record(Closeable):
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
         """One transaction; `StorageError` if the disk does not accept it, or it is not free."""
-        self._require_same_file()
+        self._require_same_files()
         path = self.folder / FILE_NAME
         try:
             with self._db:
@@ -270,8 +279,8 @@ class Record(Closeable):
         except sqlite3.Error as error:
             raise StorageError(f"{path}: {_explain(error, self.folder)}") from error
 
-    def _require_same_file(self) -> None:
-        """Raise `StorageError` if the file was moved or removed: later rows would be lost."""
+    def _require_same_files(self) -> None:
+        """Raise `StorageError` if a file was moved, removed or cut: later rows would be lost."""
         path = self.folder / FILE_NAME
         try:
             same = is_same(path.stat(), self._file)
@@ -279,6 +288,10 @@ class Record(Closeable):
             same = False
         if not same:
             raise StorageError(f"{path}: {_absence(path_of(self._file))}")
+        loss = self._side_files.loss()
+        if loss:
+            whole = self._side_files.restore() and _checkpoint(self._db)
+            raise StorageError(f"{loss} while the scan ran: {_SAVED if whole else _LOST}")
 
 
 def _begin(database: sqlite3.Connection, meta: Mapping[str, str]) -> None:
@@ -288,6 +301,15 @@ def _begin(database: sqlite3.Connection, meta: Mapping[str, str]) -> None:
         create_tables(database)
         for row in {"schema_version": str(SCHEMA_VERSION), **meta}.items():
             database.execute("INSERT INTO meta VALUES (?, ?, ?)", sealed("meta", row))
+
+
+def _checkpoint(database: sqlite3.Connection) -> bool:
+    """Move all rows from the write-ahead log into the database; return True if it succeeded."""
+    try:
+        _, in_log, moved = database.execute("PRAGMA wal_checkpoint(FULL)").fetchone()
+    except sqlite3.Error:
+        return False
+    return bool(in_log == moved)
 
 
 def _refusal(error: Exception, path: Path) -> GonioError:
