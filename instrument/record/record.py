@@ -75,7 +75,7 @@ class Record(Closeable):
         _require_support(folder)
         with ExitStack() as on_failure:
             try:
-                record = _created(folder, meta, on_failure)
+                record = cls(*_created(folder, meta, on_failure))
             except (OSError, sqlite3.Error) as error:
                 why = _explain(error, folder)
                 raise InputError(f"{folder}: no run can be written there: {why}") from error
@@ -328,8 +328,13 @@ def _absence(now: Path | None) -> str:
     return "was moved while the scan ran: nothing accepted is lost"
 
 
-def _created(folder: Path, meta: Mapping[str, str], on_failure: ExitStack) -> Record:
-    """Return a new record; what has been made of it is removed by `on_failure`, under the lock."""
+def _created(
+    folder: Path, meta: Mapping[str, str], on_failure: ExitStack
+) -> tuple[sqlite3.Connection, Path, FolderLock]:
+    """Make a record's file, and return what a `Record` is made of.
+
+    What has been made is removed by `on_failure`, under the lock.
+    """
     path, made = folder / FILE_NAME, not folder.exists()
     if not (made or folder.is_dir()):
         raise InputError(f"{folder}: {_TAKEN}")
@@ -344,7 +349,7 @@ def _created(folder: Path, meta: Mapping[str, str], on_failure: ExitStack) -> Re
     on_failure.callback(database.close)
     _begin(database, meta)
     sync_folder(folder)
-    return Record(database, folder, lock)
+    return database, folder, lock
 
 
 def _remove_empty(folder: Path) -> None:
