@@ -5,6 +5,7 @@ Each command imports its module when it is called, so that `gonio --help` loads 
 
 from __future__ import annotations
 
+import errno
 import gc
 import math
 import os
@@ -21,7 +22,7 @@ import typer
 from typer.core import TyperGroup
 
 from acquisition.terminal.streams import lasting_streams
-from instrument.errors import GonioError, OperatorStop, StorageError
+from instrument.errors import GonioError, InputError, OperatorStop, StorageError
 from instrument.text.terminal_safe import escape_control_characters
 
 # The program's arrays are small: several threads in linear algebra would only cost time.
@@ -54,6 +55,8 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
+_SHOWN = 80  # characters of a path that is too long
+_MORE = "free memory, raise the limit (ulimit -v), or name less data; what is recorded stays"
 _AXES = ("theta_i", "dphi", "theta_r")
 
 
@@ -354,9 +357,31 @@ def errors_as_exit_codes() -> Iterator[None]:
     except GonioError as error:
         _exit(str(error), error.exit_code)
     except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            _exit(_too_long(error), InputError.exit_code)
         _exit(str(error), StorageError.exit_code)
+    except (MemoryError, ImportError, RuntimeError) as error:
+        if not _is_memory(error):
+            raise
+        _exit(f"out of memory ({str(error) or 'no details'}): {_MORE}", StorageError.exit_code)
     except KeyboardInterrupt as stop:
         _exit(str(stop) or "stopped by the operator", OperatorStop.exit_code)
+
+
+def _is_memory(error: Exception) -> bool:
+    """Return True for an error of too little memory: of data, a library or a thread."""
+    words = ("failed to map segment", "cannot allocate memory", "can't start new thread")
+    return isinstance(error, MemoryError) or any(w in str(error).lower() for w in words)
+
+
+def _too_long(error: OSError) -> str:
+    """Return the message for a path that no file system takes, which is shown only in part."""
+    path = os.fspath(error.filename) if error.filename is not None else ""
+    name = path if isinstance(path, str) else os.fsdecode(path)
+    return (
+        f"{name[:_SHOWN]}...: too long ({len(os.fsencode(name))} bytes); allowed: names of up to "
+        "255 bytes, together up to 4095: use a shorter one"
+    )
 
 
 def _exit(message: str, code: int) -> NoReturn:

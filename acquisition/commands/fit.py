@@ -36,11 +36,13 @@ def fit_source(
     `fit_status.require_result` does.
     """
     names, way = _names(models), _method(method, models)
-    with no_fit_reported(path, as_json), sign_of_life("fit"):
-        source = read_source(path, wanted)
+    with no_fit_reported(path, as_json):
+        with sign_of_life(f"reading {path.name}"):
+            source = read_source(path, wanted)
         if names is None and way == "auto":
             names, way = source.fit.models, source.fit.method
-        choice = choose(source.measurements, source.acceptance, names, robust, way)
+        with sign_of_life(f"fit of {source.measurements.size} points"):
+            choice = choose(source.measurements, source.acceptance, names, robust, way)
     found = to_json(replace(choice, notes=(*source.notes, *choice.notes)))
     if as_json:
         print_json(found)

@@ -8,6 +8,7 @@ rows end with it. The numbers are those of SQLite's "WAL-mode File Format", sect
 from __future__ import annotations
 
 import os
+import sqlite3
 import struct
 from contextlib import suppress
 from pathlib import Path
@@ -35,7 +36,17 @@ class SideFiles:
                 return f"{path} was removed"
         return next((f"{path} was cut" for path in self._own if self._is_cut(path)), "")
 
-    def restore(self) -> bool:
+    def save(self, database: sqlite3.Connection) -> bool:
+        """Move the rows of the log into the database; return False if some are lost."""
+        if not self._restore():
+            return False
+        try:
+            _, in_log, moved = database.execute("PRAGMA wal_checkpoint(FULL)").fetchone()
+        except sqlite3.Error:
+            return False
+        return bool(in_log == moved)
+
+    def _restore(self) -> bool:
         """Make what is left usable for SQLite; return False if rows of the log are lost.
 
         A cut log is read again as after a crash, since its index is made empty: its whole rows
@@ -54,11 +65,10 @@ class SideFiles:
         size = path.stat().st_size
         if path == self._index:
             return size < _INDEX_BLOCK
-        try:
-            with self._index.open("rb") as file:
-                page_bytes, frames = struct.unpack("=14xHI", file.read(20))
-        except (OSError, struct.error):
+        header = _read_open_file(self._own.get(self._index), 20)
+        if len(header) < 20:
             return False  # without its index the log cannot be judged
+        page_bytes, frames = struct.unpack("=14xHI", header)
         page_bytes = 65536 if page_bytes == 1 else page_bytes
         return bool(frames) and size < _WAL_HEADER + frames * (_FRAME_HEADER + page_bytes)
 
@@ -85,15 +95,29 @@ def is_same(one: os.stat_result, other: os.stat_result) -> bool:
     return os.path.samestat(one, other)
 
 
+def _read_open_file(file: os.stat_result | None, size: int) -> bytes:
+    """Return the first bytes of a file that SQLite has open, through its own descriptor.
+
+    The file must not be opened here: closing any descriptor of it would release all locks that this
+    process has on it (POSIX, fcntl), and another program would then empty the index in use.
+    """
+    number = None if file is None else _descriptor(file)
+    return b"" if number is None else os.pread(number, size, 0)
+
+
+def _descriptor(file: os.stat_result) -> int | None:
+    """Return the number of a descriptor of this process for a file, None without one."""
+    for link in Path("/proc/self/fd").iterdir():
+        with suppress(OSError):  # the descriptor of the listing itself, closed by now
+            if is_same(link.stat(), file):
+                return int(link.name)
+    return None
+
+
 def path_of(file: os.stat_result) -> Path | None:
     """Return the current path of a file that this process has open, None if it is not found.
 
     Of a removed file the path does not exist.
     """
-    for link in Path("/proc/self/fd").iterdir():
-        try:
-            if is_same(link.stat(), file):
-                return link.readlink()
-        except OSError:
-            continue  # the descriptor of the listing itself, closed by now
-    return None
+    number = _descriptor(file)
+    return None if number is None else Path(f"/proc/self/fd/{number}").readlink()

@@ -37,7 +37,7 @@ from instrument.record.schema import (
     create_tables,
     has_seals,
 )
-from instrument.record.seal import Damaged, sealed
+from instrument.record.seal import Damaged, sealed, storable
 from instrument.record.validation import check_files, check_schema, check_values
 from instrument.record.write_lock import begin_writing, held_by_another, is_busy
 from instrument.text.atomic_file import disk_full, explain_os_error, make_folder, sync_folder
@@ -261,7 +261,8 @@ class Record(Closeable):
         """Insert rows in the transaction that is open, sealed if the record's version has seals."""
         seals = has_seals(self._version)
         marks = ", ".join("?" * (len(_NAMES[table]) + seals))
-        whole = [sealed(table, row) if seals else row for row in rows]
+        texts = [storable(row) for row in rows]
+        whole = [sealed(table, row) if seals else row for row in texts]
         sql = f"INSERT{' OR REPLACE' * replace} INTO {table} VALUES ({marks})"
         self._db.executemany(sql, whole)
 
@@ -290,7 +291,7 @@ class Record(Closeable):
             raise StorageError(f"{path}: {_absence(path_of(self._file))}")
         loss = self._side_files.loss()
         if loss:
-            whole = self._side_files.restore() and _checkpoint(self._db)
+            whole = self._side_files.save(self._db)
             raise StorageError(f"{loss} while the scan ran: {_SAVED if whole else _LOST}")
 
 
@@ -300,16 +301,7 @@ def _begin(database: sqlite3.Connection, meta: Mapping[str, str]) -> None:
     with database:
         create_tables(database)
         for row in {"schema_version": str(SCHEMA_VERSION), **meta}.items():
-            database.execute("INSERT INTO meta VALUES (?, ?, ?)", sealed("meta", row))
-
-
-def _checkpoint(database: sqlite3.Connection) -> bool:
-    """Move all rows from the write-ahead log into the database; return True if it succeeded."""
-    try:
-        _, in_log, moved = database.execute("PRAGMA wal_checkpoint(FULL)").fetchone()
-    except sqlite3.Error:
-        return False
-    return bool(in_log == moved)
+            database.execute("INSERT INTO meta VALUES (?, ?, ?)", sealed("meta", storable(row)))
 
 
 def _refusal(error: Exception, path: Path) -> GonioError:

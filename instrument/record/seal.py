@@ -19,6 +19,13 @@ Damaged = dict[str, tuple[int, ...]]
 """SQLite's row numbers of the damaged rows, by table."""
 
 
+def storable(row: Sequence[object]) -> tuple[object, ...]:
+    """Return a row whose texts can be stored as UTF-8: the name of a file may be any bytes."""
+    return tuple(
+        v.encode("utf-8", "backslashreplace").decode() if isinstance(v, str) else v for v in row
+    )
+
+
 def sealed(table: str, row: Sequence[object]) -> tuple[object, ...]:
     """Return a row with its seal, as it is inserted."""
     columns = TABLES[table]

@@ -13,9 +13,11 @@ import typer
 from acquisition.cli import errors_as_exit_codes
 from instrument.errors import DeviceError, InputError, NotDetermined, OperatorStop, StorageError
 from tests.support.command import gonio_here as gonio
+from tests.support.paths import CONFIGS
 from tests.support.scans import small_demo
 
 DEADLINE_S = 60.0
+PROTOCOL = CONFIGS / "protocols" / "demo.yaml"
 
 
 @pytest.mark.parametrize(
@@ -25,6 +27,15 @@ DEADLINE_S = 60.0
         (DeviceError("theta_r: stalled"), 3, "theta_r: stalled"),
         (StorageError("disk full"), 3, "disk full"),
         (PermissionError(13, "Permission denied", "run"), 3, "Permission denied: 'run'"),
+        (OSError(36, "File name too long", "x" * 300), 2, "xxx...: too long (300 bytes); allowed:"),
+        (
+            MemoryError("Unable to allocate 9 GiB"),
+            3,
+            "out of memory (Unable to allocate 9 GiB): free",
+        ),
+        (MemoryError(), 3, "out of memory (no details): free memory, raise the limit"),
+        (ImportError("cv2.so: failed to map segment from shared object"), 3, "out of memory (cv2"),
+        (RuntimeError("can't start new thread"), 3, "out of memory (can't start new thread)"),
         (OperatorStop("stopped at the prompt"), 4, "stopped at the prompt"),
         (KeyboardInterrupt(), 4, "stopped by the operator"),
         (NotDetermined("two points"), 5, "two points"),
@@ -38,6 +49,26 @@ def test_an_error_is_a_message_and_an_exit_code(
         raise error
     assert ended.value.exit_code == code
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("error", [ImportError("no module"), RuntimeError("a mistake")])
+def test_a_mistake_of_the_program_is_not_disguised(error: Exception) -> None:
+    with pytest.raises(type(error), match=str(error)), errors_as_exit_codes():
+        raise error
+
+
+@pytest.mark.parametrize(
+    "command", [("run", PROTOCOL, "--out"), ("resume",), ("report",), ("fit",)]
+)
+@pytest.mark.parametrize("name", ["x" * 300, "/".join(["y" * 200] * 30)])
+def test_a_path_that_is_too_long_is_wrong_input(
+    command: tuple[object, ...], name: str, tmp_path: Path
+) -> None:
+    done = gonio(*command, tmp_path / name)
+    assert done.returncode == 2
+    assert "too long" in done.stderr
+    assert "allowed: names of up to 255 bytes" in done.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_usage_errors_exit_with_2() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import subprocess
@@ -48,6 +49,21 @@ def test_json_alone_is_on_standard_output(rough: Path) -> None:
         "sigma_deg"
     ]
     assert abs(sigma["value"] - 30) < 4 * sigma["u"]
+
+
+def test_reading_a_long_table_and_fitting_it_are_told_apart_while_one_waits(
+    rough: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A table of 1.7 million rows takes a minute to read; `test_progress` tests what is shown."""
+    tasks: list[str] = []
+
+    def noted(task: str) -> contextlib.AbstractContextManager[None]:
+        tasks.append(task)
+        return contextlib.nullcontext()
+
+    monkeypatch.setattr("acquisition.commands.fit.sign_of_life", noted)
+    assert gonio("fit", rough, "--models", "lambert").returncode == 0
+    assert tasks == ["reading rough.csv", f"fit of {3 * VIEWS.size} points"]
 
 
 def test_a_person_reads_parameters_candidates_and_why(rough: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
 import shutil
 import signal
@@ -311,3 +312,13 @@ def test_permission_to_move_is_asked_with_the_reason_of_the_stop_and_recorded(
         "the rig may move: yes, asked at the terminal",
         "the rig may move: --yes",
     ]
+
+
+def test_a_protocol_and_a_run_whose_names_are_no_utf_8(tmp_path: Path) -> None:
+    protocol = tmp_path / os.fsdecode(b"pr\xff.yaml")
+    small_demo(tmp_path).rename(protocol)
+    run = tmp_path / os.fsdecode(b"run\xfe")
+    done = gonio("run", protocol, "--out", run)
+    assert done.returncode == 0, done.stderr
+    assert gonio("report", run).returncode == 0
+    assert {path.name for path in run.iterdir()} >= {"record.sqlite", "report.html", "fit.json"}

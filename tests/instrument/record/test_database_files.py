@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import sqlite3
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ from instrument.errors import StorageError
 from instrument.record.record import FILE_NAME, Record
 from tests.support.storage.sample_records import reading
 
+COUNT = "SELECT COUNT(*) FROM reading"
 REMOVED = [("-wal",), ("-shm",), ("-wal", "-shm")]
 
 
@@ -98,3 +101,35 @@ def test_another_tool_that_empties_the_log_properly_is_no_loss(tmp_path: Path, w
                 other.execute(f"PRAGMA {way}")
                 other.close()
     assert steps(tmp_path / "run") == list(range(20))
+
+
+def test_the_locks_of_the_writer_stay_while_its_files_are_watched(tmp_path: Path) -> None:
+    """A process loses its locks on a file when it closes any descriptor of it.
+
+    Another program that finds no lock on the index empties it, and the writer gets SIGBUS.
+    """
+    file = tmp_path / "run" / FILE_NAME
+    with Record.create(tmp_path / "run", {}) as record:
+        for step in range(3):
+            record.add_reading(reading(step))
+        locked = [byte for byte in range(120, 129) if _locked(Path(f"{file}-shm"), byte)]
+        assert 128 in locked  # "DMS", by which SQLite knows that others use the index
+        look = (
+            f"import sqlite3; print(*sqlite3.connect({str(file)!r}).execute({COUNT!r}).fetchone())"
+        )
+        for step in range(3, 6):
+            done = subprocess.run(
+                [sys.executable, "-c", look], capture_output=True, text=True, check=True
+            )
+            assert done.stdout == f"{step}\n"
+            record.add_reading(reading(step))
+
+
+def _locked(file: Path, byte: int) -> bool:
+    """Return True if a process holds a lock, shared or not, on a byte of the file."""
+    inode = str(file.stat().st_ino)
+    for words in map(str.split, Path("/proc/locks").read_text().splitlines()):
+        own = words[-3].rpartition(":")[2] == inode and words[-1] != "EOF"
+        if own and int(words[-2]) <= byte <= int(words[-1]):
+            return True
+    return False

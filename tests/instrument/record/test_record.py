@@ -100,3 +100,14 @@ def test_a_python_with_an_old_sqlite_is_refused(
     with pytest.raises(InputError, match=r"needed: 3\.37\.0 or later: use another Python"):
         Record.create(tmp_path / "run", {})
     assert not (tmp_path / "run").exists()
+
+
+def test_texts_of_any_bytes_are_stored_readably(tmp_path: Path) -> None:
+    """As the name of a protocol's file gives them, which need be no UTF-8."""
+    name = os.fsdecode(b"pr\xff\xc3\xb6.yaml")
+    with Record.create(tmp_path / name, {"protocol_file": name}) as record:
+        record.add_event("2026", "fault", f"{name}: gone")
+    with Record.open(tmp_path / name) as record:
+        assert record.meta("protocol_file") == r"pr\udcffö.yaml"
+        assert list(record.events()) == [("2026", "fault", r"pr\udcffö.yaml: gone")]
+        assert record.damaged() == ()
