@@ -130,9 +130,12 @@ def test_an_axis_whose_port_comes_back_is_stopped(opened: Opened) -> None:
 
 
 def test_a_port_in_use_is_refused(opened: Opened) -> None:
-    port = PORTS[opened.place.port]
-    with Lines(SystemClock()) as lines, pytest.raises(DeviceError, match=f"cannot open {port}"):
-        open_stage("another", opened.place.axis, port, lines)
+    """By its link, and by the node's own name, under which only the system knows it."""
+    link = PORTS[opened.place.port]
+    node = os.path.realpath(link)
+    for port, message in ((link, f"{link} is in use by"), (node, f"cannot open {node}")):
+        with Lines(SystemClock()) as lines, pytest.raises(DeviceError, match=message):
+            open_stage("another", opened.place.axis.model_copy(update={"port": port}), port, lines)
     opened.stage.start_move(1.0)
     assert opened.stage.wait() == pytest.approx(1.0, abs=0.05)
 
