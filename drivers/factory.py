@@ -6,8 +6,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, assert_never
+from typing import TYPE_CHECKING, TypeVar, assert_never
 
 from drivers.lines.device_lock import DeviceLock
 from drivers.lines.serial_line import Line
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
     from drivers.lines.modbus_bus import ModbusBus
     from drivers.lines.modbus_client import BusSettings
     from drivers.v4l2.settings import V4l2Settings
+
+
+Port = TypeVar("Port", bound=Closeable)
 
 
 class Lines(Closeable):
@@ -43,12 +47,9 @@ class Lines(Closeable):
     ) -> Line:
         """Return the line of a serial port; the first call opens it."""
         if port not in self._serial:
-            with self._locked(who, port) as opening:
-                line = opening.enter_context(
-                    Line(who, port, baudrate, self.clock, xonxoff, reply_s)
-                )
-                self._closing.push(opening.pop_all())
-            self._serial[port] = line
+            self._serial[port] = self._open(
+                who, port, lambda: Line(who, port, baudrate, self.clock, xonxoff, reply_s)
+            )
         return self._serial[port]
 
     def modbus(self, who: str, settings: BusSettings) -> ModbusBus:
@@ -56,18 +57,19 @@ class Lines(Closeable):
         from drivers.lines.modbus_bus import ModbusBus
 
         if settings.port not in self._modbus:
-            with self._locked(who, settings.port) as opening:
-                bus = opening.enter_context(ModbusBus(who, settings, self.clock))
-                self._closing.push(opening.pop_all())
-            self._modbus[settings.port] = bus
+            self._modbus[settings.port] = self._open(
+                who, settings.port, lambda: ModbusBus(who, settings, self.clock)
+            )
         return self._modbus[settings.port]
 
-    @staticmethod
-    def _locked(who: str, port: str) -> ExitStack:
-        """Return a stack that holds the lock of a port, and ends it if the port does not open."""
-        opening = ExitStack()
-        opening.enter_context(DeviceLock(who, port))
-        return opening
+    def _open(self, who: str, port: str, make: Callable[[], Port]) -> Port:
+        """Lock a port and open it; the lock ends with it, or at once if it does not open."""
+        with ExitStack() as opening:
+            opening.enter_context(DeviceLock(who, port))
+            opened = make()
+            opening.callback(opened.close)
+            self._closing.push(opening.pop_all())
+        return opened
 
 
 def open_stage(name: str, axis: Wired, port: str, lines: Lines) -> MotorStage:

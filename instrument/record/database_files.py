@@ -11,6 +11,7 @@ import os
 import sqlite3
 import struct
 from contextlib import suppress
+from os.path import samestat
 from pathlib import Path
 
 SIDE_FILES = ("-wal", "-shm")
@@ -30,7 +31,7 @@ class SideFiles:
         """Return which file was removed, replaced or cut, in words; empty if none was."""
         for path, own in self._own.items():
             try:
-                if not is_same(path.lstat(), own):
+                if not samestat(path.lstat(), own):
                     return f"{path} was replaced"
             except OSError:
                 return f"{path} was removed"
@@ -55,7 +56,7 @@ class SideFiles:
         """
         cut = [path for path in self._own if path.exists() and self._is_cut(path)]
         own = self._own.get(self._index)
-        if cut and own is not None and self._index.exists() and is_same(self._index.lstat(), own):
+        if cut and own is not None and self._index.exists() and samestat(self._index.lstat(), own):
             size = max(own.st_size, self._index.stat().st_size, _INDEX_BLOCK)
             for length in (0, size):
                 os.truncate(self._index, length)
@@ -85,14 +86,9 @@ def create_file(path: Path) -> os.stat_result:
 def remove_database(path: Path, own: os.stat_result) -> None:
     """Remove a database that could not be begun, with its side files, if it is still `own`."""
     with suppress(OSError):
-        if is_same(path.lstat(), own):
+        if samestat(path.lstat(), own):
             for end in ("-journal", *SIDE_FILES, ""):
                 Path(f"{path}{end}").unlink(missing_ok=True)
-
-
-def is_same(one: os.stat_result, other: os.stat_result) -> bool:
-    """Return True for the same file, under whichever name."""
-    return os.path.samestat(one, other)
 
 
 def _read_open_file(file: os.stat_result | None, size: int) -> bytes:
@@ -109,7 +105,7 @@ def _descriptor(file: os.stat_result) -> int | None:
     """Return the number of a descriptor of this process for a file, None without one."""
     for link in Path("/proc/self/fd").iterdir():
         with suppress(OSError):  # the descriptor of the listing itself, closed by now
-            if is_same(link.stat(), file):
+            if samestat(link.stat(), file):
                 return int(link.name)
     return None
 

@@ -13,6 +13,7 @@ import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import astuple
+from os.path import samestat
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,6 @@ from instrument.errors import GonioError, InputError, StorageError
 from instrument.record.database_files import (
     SideFiles,
     create_file,
-    is_same,
     path_of,
     remove_database,
 )
@@ -284,7 +284,7 @@ class Record(Closeable):
         """Raise `StorageError` if a file was moved, removed or cut: later rows would be lost."""
         path = self.folder / FILE_NAME
         try:
-            same = is_same(path.stat(), self._file)
+            same = samestat(path.stat(), self._file)
         except OSError:
             same = False
         if not same:
