@@ -32,8 +32,8 @@ from sim.emulated.wire import Controller
 from sim.emulated.zaber_controller import ZaberController
 from sim.scene.scene import Scene
 from tests.hil_emulated.host.computer import Computer
-from tests.hil_emulated.host.socket_wire import SocketWire
 from tests.support.command import gonio
+from tests.support.stages.socket_wire import SocketWire, unix_listener
 from tests.support.whole_scans.simulated_rig import Points, points, simulated
 
 Look = Literal["levels", "surface", "scene"]
@@ -66,7 +66,7 @@ class HostBench(Closeable):
         self.camera = _ThreeLooks(config, bench.camera(config))
         self.adapters = {name: folder / name for name in ADAPTERS}
         for name, path in self.adapters.items():
-            self._closing.enter_context(SocketWire([controllers[name]], path))
+            self._closing.enter_context(SocketWire([controllers[name]], unix_listener(path)))
         self.usb = self._closing.enter_context(UsbIpServer(self._usb_devices(controllers)))
 
     def _usb_devices(self, controllers: Mapping[str, Controller]) -> dict[str, UsbDevice]:

@@ -9,13 +9,13 @@ from pathlib import Path
 from instrument.clock import SystemClock
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.newport_controller import NewportController
-from tests.hil_emulated.host.socket_wire import SocketWire
+from tests.support.stages.socket_wire import SocketWire, unix_listener
 
 
 def test_each_connection_is_answered_and_none_outlives_the_wire(tmp_path: Path) -> None:
     before = threading.active_count()
     controller = NewportController(Motor(Mechanics(), SystemClock()))
-    with SocketWire([controller], tmp_path / "port"):
+    with SocketWire([controller], unix_listener(tmp_path / "port")):
         for _ in range(2):  # the computer may be switched off and on
             with socket.socket(socket.AF_UNIX) as port:
                 port.settimeout(5)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import socket
 from collections.abc import Sequence
 from typing import Protocol
 
-from sim.emulated.wire import Controller, Wire
+from sim.emulated.wire import Controller
+from tests.support.stages.socket_wire import SocketWire
 
 _HEADER = 7  # bytes: transaction (2), protocol = 0 (2), length (2), unit (1)
 _MAX_FRAME = 260  # bytes
@@ -54,35 +54,12 @@ class ModbusTcpGateway:
         return frame[:4] + (1 + len(answer)).to_bytes(2, "big") + frame[6:7] + answer
 
 
-class TcpWire(Wire):
+class TcpWire(SocketWire):
     """TCP port of a gateway; the master connects to `host` and `port`."""
 
     host = "127.0.0.1"
 
     def __init__(self, controllers: Sequence[Controller]) -> None:
-        self._listener = socket.create_server((self.host, 0))
-        self.port: int = self._listener.getsockname()[1]
-        self._peer: socket.socket | None = None
-        super().__init__(controllers)
-
-    def _serve(self) -> None:
-        while not self._closing.is_set():
-            try:
-                self._peer, _ = self._listener.accept()
-                with self._peer as peer:  # closed before the next connection is accepted
-                    while data := peer.recv(4096):
-                        self._receive(data)
-            except OSError:
-                continue  # unplugged, or the master has disconnected
-
-    def _send(self, data: bytes) -> None:
-        if self._peer is not None:
-            with contextlib.suppress(OSError):  # the master has disconnected
-                self._peer.sendall(data)
-
-    def _unplug(self) -> None:
-        for end in (self._peer, self._listener):
-            if end is not None:
-                with contextlib.suppress(OSError):  # not connected
-                    end.shutdown(socket.SHUT_RDWR)
-                end.close()
+        listener = socket.create_server((self.host, 0))
+        self.port: int = listener.getsockname()[1]
+        super().__init__(controllers, listener)
