@@ -42,6 +42,13 @@ class WrongRigFile(DeviceError):
     """Device that cannot do what the rig file says: a run with this file cannot be resumed."""
 
 
+class Interlock(DeviceError):
+    """Fault that no device reports, seen in what was measured: the scan ends, and may be resumed.
+
+    The message names the interlock, what was seen and expected, and what to look at.
+    """
+
+
 class CameraLost(DeviceError):
     """Camera is gone or sends no frames; the next call to it searches for it and reopens it."""
 
