@@ -2,14 +2,16 @@
 
 Emulated controllers answer within the real ones' times, and drivers have the real time-outs. Where
 the test process gets no processor for longer than that, both miss theirs, and a failure says
-nothing about the program. A thread measures such standstills; a test in real time that failed in
-one is repeated, and the summary of the test run says so. A failure without a standstill counts.
+nothing about the program. A thread measures such standstills, one long one or many short ones in a
+row; a test in real time that failed in one is repeated, and the summary of the test run says so. A
+failure without a standstill counts.
 """
 
 from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from types import TracebackType
 
 import pytest
@@ -18,15 +20,20 @@ from _pytest.runner import runtestprotocol
 MARKS = ("waits", "real_time")
 TRIES = 4
 STANDSTILL_S = 0.05  # a third of the shortest time-out of a reply
+# Short ones in a row: a fifth of the time for which a moving stage may be silent.
+LATE_S, WITHIN_S = 0.1, 0.5
 _TICK_S = 0.01
 _PROPERTY = "repeated"
 
 
 class Standstills:
-    """Longest delay of a thread that wakes every 10 ms, within a `with` block."""
+    """Delays of a thread that wakes every 10 ms, within a `with` block.
+
+    longest_s: the longest. late_s: the largest sum of those within WITHIN_S.
+    """
 
     def __init__(self) -> None:
-        self.longest_s = 0.0
+        self.longest_s = self.late_s = 0.0
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._measure, daemon=True, name="standstills")
 
@@ -45,10 +52,22 @@ class Standstills:
 
     def _measure(self) -> None:
         woken_s = time.monotonic()
+        delays_s: deque[tuple[float, float]] = deque()
         while not self._done.wait(_TICK_S):
             now_s = time.monotonic()
-            self.longest_s = max(self.longest_s, now_s - woken_s - _TICK_S)
-            woken_s = now_s
+            delay_s, woken_s = now_s - woken_s - _TICK_S, now_s
+            self.longest_s = max(self.longest_s, delay_s)
+            delays_s.append((now_s, delay_s))
+            while delays_s[0][0] < now_s - WITHIN_S:
+                delays_s.popleft()
+            self.late_s = max(self.late_s, sum(delay for _, delay in delays_s))
+
+    @property
+    def cause(self) -> str:
+        """What kept the test from running, empty if nothing did."""
+        if self.longest_s > STANDSTILL_S:
+            return f"{self.longest_s:.2f} s"
+        return f"{self.late_s:.2f} s of {WITHIN_S} s" if self.late_s > LATE_S else ""
 
 
 def is_repeated(item: pytest.Item) -> bool:
@@ -63,10 +82,10 @@ def run_in_real_time(item: pytest.Item, nextitem: pytest.Item | None) -> None:
     while True:
         with Standstills() as standstills:
             reports = runtestprotocol(item, nextitem=nextitem, log=False)
-        again = standstills.longest_s > STANDSTILL_S and len(causes) + 1 < TRIES
-        if not again or not any(report.failed for report in reports):
+        cause = standstills.cause
+        if not cause or len(causes) + 1 == TRIES or not any(r.failed for r in reports):
             break
-        causes.append(f"{standstills.longest_s:.2f} s")
+        causes.append(cause)
     for report in reports:
         if causes and report.when == "call":
             report.user_properties.append((_PROPERTY, ", ".join(causes)))

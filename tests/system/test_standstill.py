@@ -27,7 +27,7 @@ def pytest_terminal_summary(terminalreporter):
 """
 # `stand_still` keeps every other thread of the process waiting: a call that holds Python's lock.
 TESTS = """
-import ctypes, pathlib, pytest
+import ctypes, pathlib, pytest, time
 
 def count(name):
     with pathlib.Path(name).open("a") as file:
@@ -47,6 +47,13 @@ def test_fails_twice_in_a_standstill(given):
         stand_still()
         assert not "failed"
 
+def test_fails_once_in_short_standstills():
+    if count("short") < 2:
+        for _ in range(10):
+            ctypes.PyDLL(None).usleep(40_000)
+            time.sleep(0.005)
+        assert not "failed"
+
 def test_fails_always_in_a_standstill():
     count("always")
     stand_still()
@@ -60,6 +67,7 @@ def test_passes_in_a_standstill():
     count("passes")
     stand_still()
 """
+NAMES = ("twice", "short", "always", "passes")
 
 
 def test_a_failure_in_a_standstill_is_repeated_and_any_other_counts(tmp_path: Path) -> None:
@@ -71,9 +79,9 @@ def test_a_failure_in_a_standstill_is_repeated_and_any_other_counts(tmp_path: Pa
         [sys.executable, "-c", command, *alone],
         cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
-    times = {name: len((tmp_path / name).read_text()) for name in ("twice", "always", "passes")}
-    assert times == {"twice": 3, "always": TRIES, "passes": 1}, done.stdout
-    assert "2 failed, 2 passed" in done.stdout
+    times = {name: len((tmp_path / name).read_text()) for name in NAMES}
+    assert times == {"twice": 3, "short": 2, "always": TRIES, "passes": 1}, done.stdout
+    assert "2 failed, 3 passed" in done.stdout
     repeated = "test_fails_twice_in_a_standstill: repeated, as the machine stood still for 0."
     assert repeated in done.stdout
     if (
