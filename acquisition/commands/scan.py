@@ -31,8 +31,14 @@ from acquisition.terminal.operator import require_yes
 from acquisition.terminal.progress import sign_of_life
 from instrument.config.load import Loaded, load_protocol
 from instrument.errors import OperatorStop
-from instrument.record.event_kinds import DAMAGED, FAULT, RESUMED, STOPPED
+from instrument.record.event_kinds import DAMAGED, FAULT, FINISHED, RESUMED, STOPPED
 from instrument.record.record import Record
+
+_KILLED = (
+    "The scan ended without a word: its program was killed, or the computer was switched off. What "
+    "moved then went on to the end of its move, or may still be moving\n"
+)
+_STATES = (FAULT, STOPPED, RESUMED, FINISHED)
 
 
 def run_protocol(
@@ -131,17 +137,27 @@ def _finish(record: Record, loaded: Loaded, as_json: bool) -> None:
 
 def _confirm(yes: bool, steps: int, record: Record) -> None:
     """Ask whether the rig may move, unless `yes` says so; record who answered."""
-    ends = [(kind, why) for _, kind, why in record.events() if kind in (FAULT, STOPPED)]
-    if not yes:
-        last = f"The scan ended with: {ends[-1][1]}\n" if ends else ""
-        last += f"{damage_text(record)}\n" if record.damaged() else ""
+    ended = _ended_with(record)
+    if yes:
+        console.print(ended, end="", highlight=False, soft_wrap=True)
+    else:
+        last = f"{damage_text(record)}\n" if record.damaged() else ""
         require_yes(
-            f"{last}{steps} readings are missing. Is the rig clear, may the stage move?",
+            f"{ended}{last}{steps} readings are missing. Is the rig clear, may the stage move?",
             "gonio resume: nobody to ask whether the rig may move: add --yes",
             "not resumed: nothing has moved",
         )
     how = "--yes" if yes else "yes, asked at the terminal"
     record.add_event(datetime.now(UTC).isoformat(), RESUMED, f"the rig may move: {how}")
+
+
+def _ended_with(record: Record) -> str:
+    """Return a line that says why the scan ended; a program that was killed has left no word."""
+    events = [(RESUMED, ""), *((kind, why) for _, kind, why in record.events() if kind in _STATES)]
+    kind, why = events[-1]
+    if kind == FINISHED:  # readings were damaged since
+        return ""
+    return _KILLED if kind == RESUMED else f"The scan ended with: {why}\n"
 
 
 def _remove_damaged(record: Record) -> None:

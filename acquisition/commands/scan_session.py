@@ -17,11 +17,13 @@ from instrument.errors import DeviceError, OperatorStop, StorageError, WrongRigF
 from instrument.record.event_kinds import FAULT, FINISHED, STOPPED
 from instrument.record.record import Record
 
-# Loggers of what a person can help with: a record or a camera that is waited for, an exposure.
+# Loggers of what a person can help with: a record or a camera that is waited for, an exposure, an
+# axis that is not where it was.
 _TO_BE_SEEN = (
     "instrument.record",
     "acquisition.engine.retrying_camera",
     "acquisition.engine.exposure_check",
+    "acquisition.engine.resume",
 )
 
 

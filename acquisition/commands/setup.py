@@ -6,7 +6,7 @@ from pathlib import Path
 
 from acquisition.plan.moves import axis_moves
 from acquisition.rig import OpenRig, restart_for_emulated_camera
-from acquisition.terminal.console import out
+from acquisition.terminal.console import console, out
 from acquisition.terminal.operator import require_yes
 from instrument.config.axes import AXES, HandAxis, MotorAxis
 from instrument.config.load import load_rig
@@ -115,8 +115,10 @@ def require_rig(path: Path | None) -> Rig:
 
 
 def _confirm(rig: Rig, yes: bool, question: str) -> None:
-    """Ask before a real rig moves, unless `yes`."""
-    if rig.real and not yes:
+    """Say what will move on a real rig, and ask, unless `yes`."""
+    if rig.real and yes:
+        console.print(question, highlight=False, soft_wrap=True)
+    elif rig.real:
         require_yes(
             f"{question} Is the rig clear?",
             f"{question}\nnobody to ask whether the rig is clear: add --yes",

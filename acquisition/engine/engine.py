@@ -16,7 +16,7 @@ from acquisition.engine.exposer import Exposed, Exposer
 from acquisition.engine.frame_files import write_frames
 from acquisition.engine.positioner import Positioner
 from acquisition.engine.preview import make_preview
-from acquisition.engine.resume import Progress, check_text
+from acquisition.engine.resume import Progress, check_text, report_found
 from acquisition.engine.retrying_camera import RetryingCamera
 from acquisition.measure.placement import Placement
 from acquisition.measure.radiometry import Signal, measure
@@ -127,7 +127,7 @@ class Engine:
         The lamp is checked for drift at the first step, and wherever it is set again for a block
         of which readings are kept: one of them was damaged in the record.
         """
-        self._positioner.recover_position()
+        report_found(self._positioner.recover_position(), progress, self._rig)
         self._open_shutter()
         self._exposer.restore(progress.readings)
         self._exposer.take_darks(plan.darks_first_s)

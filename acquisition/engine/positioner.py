@@ -47,17 +47,23 @@ class Positioner:
         for axis in self._axes.values():
             axis.home()
 
-    def recover_position(self) -> None:
-        """Determine the pose after an interruption: stop all axes, home those that need it."""
+    def recover_position(self) -> dict[str, float]:
+        """Determine the pose after an interruption: stop all axes, home those that need it.
+
+        Returns the angles in degrees at which the others were found.
+        """
         for axis in self._axes.values():
             axis.stop()
-        angles = home_pose(self._rig)._asdict()  # nan for an axis set by hand
-        for name, axis in self._axes.items():
-            if not axis.by_hand and axis.homed():
-                angles[name] = axis.position_deg()
-            elif not axis.by_hand:
+        motors = {name: axis for name, axis in self._axes.items() if not axis.by_hand}
+        found = {}
+        for name, axis in motors.items():
+            if axis.homed():
+                found[name] = axis.position_deg()
+            else:
                 axis.home()
-        self.pose = Pose(**angles)
+        # nan for an axis set by hand
+        self.pose = Pose(**{**home_pose(self._rig)._asdict(), **found})
+        return found
 
     def move_to(self, pose: Pose) -> None:
         """Move to a pose and come to rest; raise `NoPathError`, before moving, without a path."""

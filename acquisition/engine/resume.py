@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import logging
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import groupby
 
 from acquisition.measure.drift import JUMP_U, MIN_JUMP, Drift, is_usable, rate
 from acquisition.plan.plan import Plan, Step
+from instrument.config.rig import Rig
 from instrument.record.reading import Check, Reading
 from instrument.record.record import Record
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +70,25 @@ class Progress:
             before_step=next_step.index, expected=expected, u_expected=u, jumped=jumped,
             reading=repeated,
         )  # fmt: skip
+
+
+def report_found(found: Mapping[str, float], progress: Progress, rig: Rig) -> None:
+    """Log each axis that was found elsewhere than at the last accepted reading.
+
+    A program that was killed could not stop what it had set in motion. `found`: angles in degrees
+    of the axes that have kept their reference.
+    """
+    last = max(progress.readings, key=lambda r: r.time_s, default=None)
+    for name, at_deg in found.items():
+        if last is None:
+            log.warning("%s: found at %.4f deg; no reading had been taken", name, at_deg)
+            continue
+        before_deg = getattr(last, f"{name}_deg")
+        if abs(at_deg - before_deg) > rig.axes[name].tolerance_deg:
+            log.warning(
+                "%s: found at %.4f deg; the last reading had been taken at %g deg",
+                name, at_deg, before_deg,
+            )  # fmt: skip
 
 
 def check_text(check: Check) -> str:

@@ -314,6 +314,27 @@ def test_permission_to_move_is_asked_with_the_reason_of_the_stop_and_recorded(
     ]
 
 
+@pytest.mark.parametrize(
+    ("kinds", "words"),
+    [
+        ([], "ended without a word"),
+        (["stopped", "resumed"], "ended without a word"),
+        (["resumed", "stopped"], "The scan ended with: why"),
+        (["stopped", "resumed", "finished"], "^9 readings"),
+    ],
+)
+def test_a_resume_says_how_the_scan_ended_also_where_no_word_of_it_was_left(
+    kinds: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr(scan, "require_yes", lambda question, *_: asked.append(question))
+    with Record.create(tmp_path / "run", {}) as record:
+        for kind in kinds:
+            record.add_event("2026", kind, "why")
+        scan._confirm(False, 9, record)
+    assert re.search(words, asked[0])
+
+
 def test_a_protocol_and_a_run_whose_names_are_no_utf_8(tmp_path: Path) -> None:
     protocol = tmp_path / os.fsdecode(b"pr\xff.yaml")
     small_demo(tmp_path).rename(protocol)

@@ -179,3 +179,5 @@ def test_nothing_real_moves_before_somebody_has_said_so(real_rig: Path) -> None:
         assert not bench.motor.referenced
         at_terminal(["home", "theta_r", "--rig", real_rig], {"[y/N]": "y\n"}, "stands at 0.0000")
         assert bench.motor.referenced
+        moved = gonio("move", "theta_r", "1.5", "--rig", real_rig, "--yes")
+        assert "theta_r will move from 0.0000 to 1.5 deg" in moved.stderr

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from acquisition.engine.resume import Progress, report_found
 from acquisition.results.reduction import reduce
 from instrument.config.load import Loaded
 from instrument.record.reading import Reading
@@ -51,6 +52,27 @@ def test_cut_again_and_again_the_rest_is_the_same(
             scan(small, record, upto)
         scan(small, record)
         assert undated(record.readings()) == whole
+
+
+def test_an_axis_found_elsewhere_than_at_the_last_reading_is_named(
+    small: Loaded, whole: list[Reading], caplog: pytest.LogCaptureFixture
+) -> None:
+    """As after a kill in the middle of a move; within its tolerance it is where it was."""
+    last = whole[5]
+    near = 0.9 * small.rig.axes.theta_i.tolerance_deg
+    found = {"theta_i": last.theta_i_deg + near, "theta_r": last.theta_r_deg + 12.5}
+    report_found(found, Progress(tuple(whole[:6])), small.rig)
+    at = f"found at {last.theta_r_deg + 12.5:.4f} deg"
+    assert caplog.messages == [
+        f"theta_r: {at}; the last reading had been taken at {last.theta_r_deg:g} deg"
+    ]
+
+
+def test_before_the_first_reading_an_axis_is_named_wherever_it_is_found(
+    small: Loaded, caplog: pytest.LogCaptureFixture
+) -> None:
+    report_found({"theta_r": 3.0}, Progress(), small.rig)
+    assert caplog.messages == ["theta_r: found at 3.0000 deg; no reading had been taken"]
 
 
 def test_levels_after_a_jump_of_the_lamp_refer_to_the_check_at_the_resume(

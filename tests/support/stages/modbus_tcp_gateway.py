@@ -55,11 +55,11 @@ class ModbusTcpGateway:
 
 
 class TcpWire(SocketWire):
-    """TCP port of a gateway; the master connects to `host` and `port`."""
+    """TCP port of a gateway, any free one by default; the master connects to `host` and `port`."""
 
     host = "127.0.0.1"
 
-    def __init__(self, controllers: Sequence[Controller]) -> None:
-        listener = socket.create_server((self.host, 0))
+    def __init__(self, controllers: Sequence[Controller], port: int = 0) -> None:
+        listener = socket.create_server((self.host, port))
         self.port: int = listener.getsockname()[1]
         super().__init__(controllers, listener)

@@ -1,0 +1,90 @@
+"""Controller behind a line on which one byte is lost or changed, or answers get lost."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from sim.emulated.oriental_controller import OrientalController
+from sim.emulated.wire import Controller
+
+# Stops on the wire: ASCII lines, and the write of STOP into the AZ drive's input word.
+STOPS = {
+    "zaber": b" stop", "smc100": b"ST", "conex": b"ST",
+    "az rtu": bytes.fromhex("06007D0020"), "az tcp": bytes.fromhex("06007D0020"),
+}  # fmt: skip
+_GATEWAY_SILENT = 0x0B  # exception code: the device behind the gateway did not answer
+
+
+@dataclass
+class Spoiling:
+    """What happens to the bytes of one line: armed once, by time.
+
+    `log`: time (monotonic, in s), direction and bytes of each message as the controller got it.
+    """
+
+    stop: bytes
+    log: list[tuple[float, str, bytes]] = field(default_factory=list)
+    _change: Callable[[bytes], bytes] | None = None
+    _mute_until_s: float = 0.0
+
+    def spoil_stop(self, fault: str, at: float) -> None:
+        """Lose, or change, one byte of the next stop: the one at this part of its length."""
+
+        def changed(data: bytes) -> bytes:
+            index = self._begin(data)
+            end = data.find(b"\n", index) + 1 or len(data)
+            index += int(at * (end - index))
+            kept = b"" if fault == "lost byte" else bytes([data[index] ^ 0x15])
+            return data[:index] + kept + data[index + 1 :]
+
+        self._change = changed
+
+    def _begin(self, data: bytes) -> int:
+        """Index of the first byte of the message that holds the stop."""
+        found = data.find(self.stop)
+        before = data.rfind(b"\n", 0, found) + 1
+        return before if self.stop.isalpha() or self.stop[:1] == b" " else max(found - 1, 0)
+
+    def lose_answers(self, seconds: float) -> None:
+        """Lose all answers from now on, for so long."""
+        self._mute_until_s = time.monotonic() + min(seconds, 1e9)
+
+    def on_the_way(self, data: bytes) -> bytes:
+        """Return what reaches the controller."""
+        if self._change is not None and self.stop in data:
+            change, self._change = self._change, None
+            data = change(data)
+        self.log.append((time.monotonic(), "in", data))
+        return data
+
+    def back(self, answer: bytes) -> bytes:
+        """Return what reaches the program."""
+        kept = b"" if time.monotonic() < self._mute_until_s else answer
+        if answer:
+            self.log.append((time.monotonic(), "out" if kept else "lost", answer))
+        return kept
+
+
+class SpoiltLine:
+    """Serial line to a controller."""
+
+    def __init__(self, controller: Controller, spoiling: Spoiling) -> None:
+        self._controller, self._spoiling = controller, spoiling
+
+    def answer(self, data: bytes) -> bytes:
+        return self._spoiling.back(self._controller.answer(self._spoiling.on_the_way(data)))
+
+
+class SpoiltDrive:
+    """Drive behind a gateway: the gateway reports what gets lost on the line behind it."""
+
+    def __init__(self, drive: OrientalController, spoiling: Spoiling) -> None:
+        self._drive, self._spoiling, self.unit = drive, spoiling, drive.unit
+
+    def serve(self, request: bytes) -> bytes:
+        arrived = self._spoiling.on_the_way(request)
+        answer = self._drive.serve(request) if arrived == request else b""
+        silent = bytes([0x80 | request[0], _GATEWAY_SILENT])
+        return self._spoiling.back(answer) or silent

@@ -1,0 +1,163 @@
+"""Verdict on a trial: whether the axis stood in time or a line says that it may not."""
+
+from __future__ import annotations
+
+import math
+import re
+from bisect import bisect
+from dataclasses import dataclass
+
+from tests.support.stop_trials.files import PROTOCOL, U_DEG
+from tests.support.stop_trials.run_trial import Seen
+from tests.support.stop_trials.trial import ENDS_NO_PROGRAM, MAX_DEG, MIN_DEG, ON_DISK, Trial
+
+STANDS_WITHIN_S = 0.5  # promised, beyond the braking time
+CODES = (0, 3, 4)  # of the table of exit codes: the input of a trial is right
+TOLERANCE_DEG = 3 * U_DEG
+_DELAY_S = 0.005  # a thread that wakes later than this was kept waiting by the machine
+# Lines by which a person knows that the axis may be moving.
+_MAY_MOVE = re.compile(r"LOOK AT THE RIG FIRST|may (still )?(be )?mov|still moves|may go on")
+_ENDED = "all motion has ended"
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Verdict: `how` is stood, said, ended (before the signal), or for a dead program finished.
+
+    `after_s`: from the moment at which a stop was possible to the standstill; `late_s`: for how
+    long the machine kept devices and program waiting within it.
+    """
+
+    how: str
+    exceptions: tuple[str, ...]
+    after_s: float = math.nan
+    braking_s: float = math.nan
+    late_s: float = 0.0
+
+
+def verdict(trial: Trial, seen: Seen) -> Verdict:
+    """Judge a trial by the devices' own log and by what the command said."""
+    wrong = [*_crashes(seen), *_out_of_bounds(trial, seen)]
+    if math.isnan(seen.struck_s):
+        return Verdict("ended", (*wrong, *_unasked_end(trial, seen)))
+    if trial.fault in ENDS_NO_PROGRAM:
+        return Verdict("finished", (*wrong, *_unfinished(seen), *_not_told(trial, seen)))
+    after_s, braking_s, late_s = _standstill(seen)
+    in_time = after_s <= STANDS_WITHIN_S + braking_s + late_s
+    said = says_that_it_may_move(seen.text)
+    if not in_time and seen.code == 0 and _arrived(trial, seen):
+        return Verdict("ended", tuple(wrong))
+    if not in_time and not said:
+        wrong.append(
+            f"stood after {after_s:.2f} s (braking {braking_s:.2f} s, waited {late_s:.2f} s), and "
+            "no line says so"
+        )
+    if seen.at_end["moving"] and _ENDED in seen.text:
+        wrong.append(f"moves when the command has said: {seen.text[-300:]!r}")
+    how = "stood" if in_time else "said"
+    return Verdict(how, tuple(wrong), after_s, braking_s, late_s)
+
+
+def says_that_it_may_move(text: str) -> bool:
+    """True if a line names the axis and says that it may be moving."""
+    return "theta_r" in text and bool(_MAY_MOVE.search(text))
+
+
+def _crashes(seen: Seen) -> list[str]:
+    """Tracebacks, exit codes that the table does not list, and commands that do not end."""
+    found = []
+    for name, code, text in (
+        ("command", seen.code, seen.text), ("next start", seen.next_code, seen.next_text)
+    ):  # fmt: skip
+        if "Traceback" in text:
+            found.append(f"{name}: traceback: {text[-600:]!r}")
+        if code is not None and code not in CODES and code != -9:
+            found.append(f"{name}: exit code {code}: {text[-300:]!r}")
+    if seen.code is None:
+        found.append(f"the command did not end: {seen.text[-300:]!r}")
+    return found
+
+
+def _unasked_end(trial: Trial, seen: Seen) -> list[str]:
+    """Return what is wrong with a command that ended before its moment came."""
+    if seen.code == 0 or (trial.fault in ON_DISK and not seen.at_end["moving"]):
+        return []
+    return [f"ended by itself with {seen.code}: {seen.text[-300:]!r}"]
+
+
+def _out_of_bounds(trial: Trial, seen: Seen) -> list[str]:
+    """Motions beyond the limits, and moves to what nobody has asked for."""
+    scanned = PROTOCOL["sweeps"][0]["theta_r_deg"]  # type: ignore[index]  # a mapping of this form
+    asked = [trial.target_deg, trial.start_deg]
+    if trial.command != "move":
+        asked = [0.0, *scanned]
+    found = []
+    for motion in seen.at_rest.get("motions", []):
+        ends = (motion["from_deg"], motion["to_deg"])
+        if not all(MIN_DEG - 1 <= end <= MAX_DEG + 1 for end in ends):
+            found.append(f"beyond the limits: {motion}")
+        # An approach against the backlash ends half a degree beyond the target.
+        if motion["kind"] == "move" and min(abs(motion["to_deg"] - a) for a in asked) > 0.6:
+            found.append(f"not asked for: {motion}")
+    return found
+
+
+def _unfinished(seen: Seen) -> list[str]:
+    """Return what is wrong where the program could not stop the axis: it ends its last motion."""
+    motions, at_deg = seen.at_rest["motions"], seen.at_rest["position_deg"]
+    if seen.at_rest["moving"]:
+        return [f"still moves: {motions[-1]}"]
+    if motions and motions[-1]["kind"] != "brake":
+        off_deg = abs(at_deg - motions[-1]["to_deg"])
+        return [f"{off_deg:g} deg off its target: {motions[-1]}"] if off_deg > 0.01 else []
+    return []
+
+
+def _not_told(trial: Trial, seen: Seen) -> list[str]:
+    """Return what the next start has left unsaid: where it found the axis, or that it moves."""
+    found = []
+    if trial.fault == "frozen for ever" and "wait for its end" not in seen.refused_text:
+        found.append(f"a second start is not refused: {seen.refused_text[-300:]!r}")
+    moving, text = seen.next_found["moving"], seen.next_text
+    ended_deg = seen.next_found["motions"][-1]["to_deg"]
+    known = seen.next_found["referenced"] or moving
+    if known and "moving" not in text and not _names(ended_deg, text):
+        found.append(
+            f"found {'moving to' if moving else 'at'} {ended_deg:.3f} deg, and the next start does "
+            f"not say so: {text!r}"
+        )
+    return found
+
+
+def _names(at_deg: float, text: str) -> bool:
+    """True if a number of the text is this angle."""
+    numbers = map(float, re.findall(r"-?\d+(?:\.\d+)?", text))
+    return any(abs(number - at_deg) <= TOLERANCE_DEG for number in numbers)
+
+
+def _arrived(trial: Trial, seen: Seen) -> bool:
+    """True if the last motion has come to its own end."""
+    motions = seen.at_rest["motions"]
+    return bool(motions) and motions[-1]["kind"] != "brake" and not seen.at_rest["moving"]
+
+
+def _standstill(seen: Seen) -> tuple[float, float, float]:
+    """Return the time to the standstill, the braking time in it, and the machine's delays."""
+    last = seen.at_rest["motions"][-1]
+    whole_s = last["ends_s"] - last["begun_s"]
+    braking_s = whole_s if last["kind"] == "brake" else 0.0
+    stood_s = last["ends_s"]
+    after_s = max(stood_s - seen.reachable_s, 0.0)
+    late = seen.at_end["late"]
+    devices_s = sum(s for at_s, s in late if seen.struck_s <= at_s <= stood_s and s > _DELAY_S)
+    return after_s, braking_s, devices_s + _waited_s(seen.waits, seen.struck_s, stood_s)
+
+
+def _waited_s(waits: list[tuple[float, float]], from_s: float, to_s: float) -> float:
+    """Return for how long the program had no processor between two times."""
+    if not waits:
+        return 0.0
+    times = [at_s for at_s, _ in waits]
+    first = max(bisect(times, from_s) - 1, 0)
+    last = min(bisect(times, to_s), len(waits) - 1)
+    return max(waits[last][1] - waits[first][1], 0.0)

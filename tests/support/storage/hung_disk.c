@@ -1,0 +1,37 @@
+/* A disk that hangs: fsync and fdatasync wait while the file named by GONIO_HUNG_DISK is there.
+ *
+ * The wait is one that no signal ends, as that of a process in state D. Preload it. */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdlib.h>
+#include <time.h>
+#include <unistd.h>
+
+static void wait_for_the_disk(void)
+{
+    const char *path = getenv("GONIO_HUNG_DISK");
+    const struct timespec tick = {0, 2000000};
+
+    while (path != NULL && access(path, F_OK) == 0)
+        nanosleep(&tick, NULL);
+}
+
+int fsync(int descriptor)
+{
+    static int (*real)(int);
+
+    if (real == NULL)
+        real = (int (*)(int))dlsym(RTLD_NEXT, "fsync");
+    wait_for_the_disk();
+    return real(descriptor);
+}
+
+int fdatasync(int descriptor)
+{
+    static int (*real)(int);
+
+    if (real == NULL)
+        real = (int (*)(int))dlsym(RTLD_NEXT, "fdatasync");
+    wait_for_the_disk();
+    return real(descriptor);
+}
