@@ -1,6 +1,6 @@
 """Run the command line: `python -m acquisition` is `gonio`."""
 
-from acquisition.cli import main
+from acquisition.entry import main
 
 if __name__ == "__main__":
     main()

@@ -7,12 +7,9 @@ from __future__ import annotations
 
 import errno
 import gc
-import math
 import os
 import platform
-import signal
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,15 +24,6 @@ from instrument.text.terminal_safe import escape_control_characters
 
 # The program's arrays are small: several threads in linear algebra would only cost time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-STOPPING_S = 2.0  # time allowed for stopping all devices
-_STOPS: dict[int, str] = {
-    signal.SIGINT: "stopped by the operator",
-    signal.SIGTERM: "stopped by the operator (SIGTERM)",
-    signal.SIGQUIT: "stopped by the operator (SIGQUIT)",
-    signal.SIGHUP: "stopped: the terminal was closed (SIGHUP)",
-}
-"""Signals that end the command, with the text of the event in the record."""
 
 
 class _Commands(TyperGroup):
@@ -317,36 +305,15 @@ def bench(
 
 
 def main() -> None:
-    """Entry point of the `gonio` command."""
+    """Run the command line; `acquisition.entry` has installed its signals."""
     # Hardly any object is part of a cycle: rarer collections save a tenth of a short run.
     gc.set_threshold(100_000, 20, 20)
     try:
         with lasting_streams():
-            stop_on_signals()
             app()
-    except KeyboardInterrupt:
-        sys.exit(OperatorStop.exit_code)
     except StorageError as error:  # of the help, and of the last flush
         sys.stderr.write(f"{error}\n")
         sys.exit(error.exit_code)
-
-
-def stop_on_signals() -> None:
-    """Make Ctrl-C, SIGTERM, SIGQUIT and a closed terminal end the command.
-
-    A second signal within STOPPING_S is ignored, and a SIGHUP that was ignored before: `nohup`.
-    """
-    last_s = -math.inf
-
-    def interrupt(number: int, frame: object) -> None:  # noqa: ARG001 - a signal handler's form
-        nonlocal last_s
-        soon, last_s = time.monotonic() - last_s < STOPPING_S, time.monotonic()
-        if not soon:
-            raise KeyboardInterrupt(_STOPS[number])
-
-    for number in _STOPS:
-        if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, interrupt)
 
 
 @contextmanager

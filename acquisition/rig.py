@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from acquisition.engine.axis import Axis
 from acquisition.engine.engine import Devices
+from acquisition.terminal.orderly_end import orderly_end
 from drivers.manual import HandCoveredLamp, HandSetAxis
 from instrument.clock import Clock, SystemClock
 from instrument.closeable import Closeable
@@ -55,7 +56,8 @@ def restart_for_emulated_camera(rig: Rig) -> None:
     if rig.emulated:
         from sim.emulated.bench import restart_with_camera
 
-        restart_with_camera()
+        with orderly_end():
+            restart_with_camera()
 
 
 def open_devices(loaded: Loaded, faults: Faults | None = None) -> Devices:

@@ -16,6 +16,7 @@ from acquisition.plan.exposure_ladder import longest_exposure_s
 from acquisition.results.model_check import check_model
 from acquisition.rig import OpenRig, restart_for_emulated_camera
 from acquisition.terminal.console import console, out
+from acquisition.terminal.orderly_end import orderly_end
 from instrument.config.load import load_protocol
 from instrument.config.protocol import PatchConfig
 from instrument.config.rig import Rig
@@ -51,7 +52,7 @@ def grab_frame(
         raise InputError(f"--exposure-s: {exposure_s:g} s; the camera can do {low:g} to {high:g} s")
     window = window_at(theta_r_deg, Pinhole.of(rig), patch.width_mm, patch.height_mm)
     restart_for_emulated_camera(rig)
-    with OpenRig(rig) as open_rig:
+    with orderly_end(), OpenRig(rig) as open_rig:
         open_rig.pose_scene(theta_r_deg)
         camera = open_rig.camera()
         frame, identity = _frame(camera, rig, window, target, exposure_s), camera.identity()

@@ -28,6 +28,7 @@ from acquisition.results.run_folder import (
 from acquisition.rig import check_ready
 from acquisition.terminal.console import console
 from acquisition.terminal.operator import require_yes
+from acquisition.terminal.orderly_end import orderly_end
 from acquisition.terminal.progress import sign_of_life
 from instrument.config.load import Loaded, load_protocol
 from instrument.errors import OperatorStop
@@ -54,7 +55,11 @@ def run_protocol(
     check_ready(loaded)
     folder = out if out is not None else default_folder(loaded)
     require_disk_space(plan, loaded, folder)
-    with Record.create(folder, run_meta(loaded, plan)) as record, record.claimed():
+    with (
+        orderly_end(),
+        Record.create(folder, run_meta(loaded, plan)) as record,
+        record.claimed(),
+    ):
         write_run_inputs(record)
         scan(loaded, plan, record)
         _finish(record, loaded, as_json)
@@ -65,7 +70,7 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
 
     `yes`: the rig may move, without asking the operator.
     """
-    with Record.open(folder, claim=True) as record:
+    with orderly_end(), Record.open(folder, claim=True) as record:
         write_run_inputs(record)
         loaded = load_run_inputs(record)
         plan = make_plan(loaded)
@@ -84,7 +89,7 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
 
 def report_run(folder: Path, as_json: bool) -> None:
     """Fit a run again and write its table and report anew; opens no device."""
-    with Record.open(folder) as record:
+    with orderly_end(), Record.open(folder) as record:
         _finish(record, load_run_inputs(record), as_json)
 
 
@@ -118,9 +123,13 @@ def _finish(record: Record, loaded: Loaded, as_json: bool) -> None:
     Raises, after all files are written, as `fit_status.require_result` does.
     """
     try:
-        from acquisition.results.finish import finish  # heavy: only after a scan
+        with (
+            orderly_end(),
+            no_fit_reported(record.folder, as_json),
+            sign_of_life("fit and report"),
+        ):
+            from acquisition.results.finish import finish  # heavy: only after a scan
 
-        with no_fit_reported(record.folder, as_json), sign_of_life("fit and report"):
             outcome = finish(record, loaded)
     except KeyboardInterrupt:
         raise OperatorStop(

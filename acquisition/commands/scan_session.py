@@ -10,7 +10,9 @@ from acquisition.engine.resume import Progress
 from acquisition.plan.plan import Plan, Step
 from acquisition.rig import open_devices
 from acquisition.terminal.console import console, duration_text, warnings_shown
+from acquisition.terminal.orderly_end import orderly_end
 from acquisition.terminal.progress import scan_progress
+from acquisition.terminal.stop_thread import stopped_by_signals
 from instrument.clock import Clock, SystemClock
 from instrument.config.load import Loaded
 from instrument.errors import DeviceError, OperatorStop, StorageError, WrongRigFile
@@ -35,7 +37,7 @@ def scan(loaded: Loaded, plan: Plan, record: Record, progress: Progress | None =
     clock: Clock = SystemClock()
     with log_to_record(record) as log, warnings_shown(*_TO_BE_SEEN):
         try:
-            with closing(open_devices(loaded)) as devices:
+            with orderly_end(), closing(open_devices(loaded)) as devices:
                 clock = devices.clock
                 _run(loaded, plan, record, progress, devices, log)
         except (KeyboardInterrupt, OperatorStop) as stop:
@@ -74,7 +76,9 @@ def _run(
             log.write()
             show(step)
 
-        Engine(loaded.protocol, loaded.rig, devices, record, on_step).run(plan, progress)
+        stops = {name: axis.stop for name, axis in devices.axes.items() if not axis.by_hand}
+        with stopped_by_signals(stops):
+            Engine(loaded.protocol, loaded.rig, devices, record, on_step).run(plan, progress)
     log.write()
     record.add_event(clock.utc().isoformat(), FINISHED, f"{len(plan.steps)} steps")
     record.set_meta("scan_s", f"{clock.now_s() - begun_s:.1f}")

@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+from acquisition.engine.axis import Axis
 from acquisition.plan.moves import axis_moves
 from acquisition.rig import OpenRig, restart_for_emulated_camera
 from acquisition.terminal.console import console, out
 from acquisition.terminal.operator import require_yes
+from acquisition.terminal.orderly_end import orderly_end
+from acquisition.terminal.stop_thread import stopped_by_signals
 from instrument.config.axes import AXES, HandAxis, MotorAxis
 from instrument.config.load import load_rig
 from instrument.config.rig import Rig
-from instrument.errors import DeviceError, InputError
+from instrument.errors import DeviceError, InputError, OperatorStop
 
 
 def home_axis(axis: str, rig_path: Path | None, yes: bool) -> None:
     """Home one axis. `yes`: the rig may move, without asking the operator."""
     rig = require_rig(rig_path)
     _motor(axis, rig)
-    with OpenRig(rig) as open_rig:
+    with orderly_end(), OpenRig(rig) as open_rig:
         stage = open_rig.axis(axis)
         _confirm(rig, yes, f"{stage.identity()}\n{axis} will look for its reference.")
-        try:
+        with _stopped_at_an_error(stage):
             stage.home()
-        except BaseException:
-            stage.stop()
-            raise
         _print_position(axis, stage.position_deg())
 
 
@@ -38,7 +40,7 @@ def move_axis(axis: str, angle_deg: float, rig_path: Path | None, yes: bool) -> 
             f"gonio move: {axis} {angle_deg:g} deg; allowed by {rig_path}: "
             f"{settings.min_deg:g} to {settings.max_deg:g} deg. Nothing has moved."
         )
-    with OpenRig(rig) as open_rig:
+    with orderly_end(), OpenRig(rig) as open_rig:
         stage = open_rig.axis(axis)
         if not rig.real:
             stage.home()  # a simulated stage starts unhomed with every command
@@ -47,14 +49,37 @@ def move_axis(axis: str, angle_deg: float, rig_path: Path | None, yes: bool) -> 
         if rig.keep_out:
             question += " The other axes are not read: keep-out zones are NOT checked."
         _confirm(rig, yes, question)
-        try:
+        with _stopped_at_an_error(stage):
             for move in axis_moves(axis, here_deg, angle_deg, rig):
                 stage.start_move(move.angle_deg)
                 stage.finish_move()
-        except BaseException:
-            stage.stop()
-            raise
         _print_position(axis, stage.position_deg())
+
+
+@contextmanager
+def _stopped_at_an_error(axis: Axis) -> Iterator[None]:
+    """Stop an axis at a signal, at once, and at any error of a `with` block in which it moves."""
+    with stopped_by_signals({axis.name: axis.stop}):
+        try:
+            with orderly_end():
+                yield
+        except BaseException as error:
+            trouble = _trouble_of_stop(axis)
+            if isinstance(error, KeyboardInterrupt):
+                why = str(error) or "stopped by the operator"
+                raise OperatorStop(why + (trouble or ": all motion has ended")) from None
+            if isinstance(error, DeviceError) and trouble:
+                raise type(error)(f"{error}{trouble}") from error
+            raise
+
+
+def _trouble_of_stop(axis: Axis) -> str:
+    """Stop an axis; return the line to be added to the reason if that failed, else nothing."""
+    try:
+        axis.stop()
+    except (DeviceError, OSError) as error:
+        return f"\nLOOK AT THE RIG FIRST: {axis.name} could not be stopped: {error}"
+    return ""
 
 
 def _print_position(axis: str, angle_deg: float) -> None:
@@ -85,7 +110,7 @@ def _identify_devices(rig_path: Path) -> None:
     restart_for_emulated_camera(rig)
     out.print(f"rig {rig.name} ({rig_path})", highlight=False)
     failed = 0
-    with OpenRig(rig) as open_rig:
+    with orderly_end(), OpenRig(rig) as open_rig:
         for name in (*AXES, "camera"):
             try:
                 device = open_rig.camera() if name == "camera" else open_rig.axis(name)

@@ -50,7 +50,12 @@ def restart_with_camera() -> None:
             atexit.register(shutil.rmtree, os.environ[_FOLDER], ignore_errors=True)
         return
     folder = Path(tempfile.mkdtemp(prefix="gonio-"))
-    added = shim_environment(compile_shim(folder), CAMERA_DEVICE, folder / "camera")
+    try:
+        library = compile_shim(folder)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    added = shim_environment(library, CAMERA_DEVICE, folder / "camera")
     added[_FOLDER] = str(folder)
     os.execve(
         sys.executable,

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import IO
 from unittest.mock import patch
 
-from acquisition.cli import main
+from acquisition.entry import main
 from tests.support.paths import ROOT
 
 
@@ -86,11 +86,12 @@ def _text(number: int, encoding: str) -> TextIOWrapper:
 
 @contextlib.contextmanager
 def own_signals() -> Iterator[None]:
-    """Restore the handlers of the signals that the command replaces."""
+    """Restore the handlers that the command replaces."""
     stops = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
     before = {number: signal.getsignal(number) for number in stops}
     try:
-        yield
+        with patch.object(sys, "unraisablehook", sys.unraisablehook):
+            yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

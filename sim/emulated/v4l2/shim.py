@@ -16,6 +16,7 @@ from instrument.errors import DeviceError
 
 _SOURCE = Path(__file__).with_name("shim.c")
 _OPTIONS = ("-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC")
+_PATIENCE_S = 120.0  # it takes about 0.2 s
 
 
 def compile_shim(folder: Path) -> Path:
@@ -28,7 +29,15 @@ def compile_shim(folder: Path) -> Path:
         )
     library = folder / "gonio_v4l2_shim.so"
     command = [compiler, *_OPTIONS, "-o", str(library), str(_SOURCE), "-ldl", "-lpthread"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=False, timeout=_PATIENCE_S
+        )
+    except subprocess.TimeoutExpired as error:
+        raise DeviceError(
+            f"emulated camera: {compiler} has not compiled {_SOURCE.name} in {_PATIENCE_S:g} s, "
+            "and was ended: look at what it waits for"
+        ) from error
     if done.returncode != 0:
         raise DeviceError(
             f"emulated camera: {compiler} could not compile {_SOURCE.name}:\n{done.stderr.strip()}"

@@ -88,12 +88,12 @@ def test_a_move_ends_with_a_closed_terminal(
             def axis(self, name: str) -> Axis:
                 return Axis(name, emulated.stage, self._rig.axes[name], SystemClock())
 
-        def strike(thread: int) -> None:
+        def strike() -> None:
             wait_until(lambda: emulated.motor.moving and emulated.motor.position_deg > 3)
-            signal.pthread_kill(thread, number)
+            os.kill(os.getpid(), number)
 
         monkeypatch.setattr(setup, "OpenRig", Emulated)
-        threading.Thread(target=strike, args=(threading.get_ident(),)).start()
+        threading.Thread(target=strike).start()
         done = gonio("move", "theta_r", "60", "--rig", BENCH)
         assert done.returncode == 4, done.stderr
         assert why in done.stderr

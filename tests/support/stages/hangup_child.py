@@ -18,9 +18,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import acquisition.commands.scan_session
-from acquisition.cli import main
 from acquisition.engine.axis import Axis
 from acquisition.engine.engine import Devices
+from acquisition.entry import main
 from acquisition.rig import open_devices
 from instrument.clock import SystemClock
 from instrument.config.load import Loaded

@@ -16,11 +16,13 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from acquisition.cli import stop_on_signals
 from acquisition.engine.axis import Axis
 from acquisition.engine.engine import Engine
 from acquisition.plan.plan import make_plan
 from acquisition.rig import open_devices
+from acquisition.terminal import stop_signals
+from acquisition.terminal.orderly_end import orderly_end
+from acquisition.terminal.stop_thread import stopped_by_signals
 from instrument.clock import SystemClock
 from instrument.config.load import load_protocol
 from instrument.errors import DeviceError
@@ -33,7 +35,7 @@ DEADLINE_S = 10.0
 
 
 def main(name: str, how: str) -> None:
-    stop_on_signals()  # again for each scan: an earlier stop belonged to another command
+    stop_signals.begin()  # again for each scan: an earlier stop belonged to another command
     with EMULATED_STAGES[name](SLOW) as emulated, TemporaryDirectory() as folder:
         moment: list[float] = []
         threading.Thread(target=_interrupt, args=(emulated, how, moment), daemon=True).start()
@@ -76,7 +78,8 @@ def _scan(emulated: EmulatedStage, how: str, moment: list[float], folder: Path) 
         stage = _Failing(stage, moment)  # type: ignore[assignment]  # a stand-in
     axis = Axis("theta_r", stage, loaded.rig.axes.theta_r, SystemClock())
     devices = replace(devices, axes={**devices.axes, "theta_r": axis})
-    with Record.create(folder / "run", {}) as record:
+    stops = {"theta_r": axis.stop}
+    with Record.create(folder / "run", {}) as record, orderly_end(), stopped_by_signals(stops):
         Engine(loaded.protocol, loaded.rig, devices, record, lambda _: None).run(make_plan(loaded))
 
 
