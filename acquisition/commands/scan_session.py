@@ -23,6 +23,7 @@ from instrument.record.record import Record
 # axis that is not where it was.
 _TO_BE_SEEN = (
     "instrument.record",
+    "acquisition.interlocks",
     "acquisition.engine.retrying_camera",
     "acquisition.engine.exposure_check",
     "acquisition.engine.resume",

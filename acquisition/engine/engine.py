@@ -7,6 +7,7 @@ again: only the operator may resume the scan.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -23,6 +24,7 @@ from acquisition.measure.radiometry import Signal, measure
 from acquisition.measure.window import Window, window_at
 from acquisition.plan.moves import NoPathError
 from acquisition.plan.plan import Plan, Step
+from acquisition.plan.pose import Pose
 from instrument.clock import Clock
 from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
@@ -119,7 +121,7 @@ class Engine:
         self._positioner.home()
         self._open_shutter()
         self._exposer.start_clock(0.0)
-        self._exposer.take_darks(plan.darks_first_s)
+        self._exposer.take_darks(plan.darks_first_s, self._window(self._positioner.pose))
 
     def _resume(self, plan: Plan, progress: Progress) -> None:
         """Restore the state in which the scan stopped, and measure what is missing.
@@ -130,7 +132,7 @@ class Engine:
         report_found(self._positioner.recover_position(), progress, self._rig)
         self._open_shutter()
         self._exposer.restore(progress.readings)
-        self._exposer.take_darks(plan.darks_first_s)
+        self._exposer.take_darks(plan.darks_first_s, self._window(self._positioner.pose))
         kept = {reading.block for reading in progress.readings}
         for number, steps in enumerate(progress.missing_by_block(plan)):
             if number == 0 or steps[0].block in kept:
@@ -206,13 +208,15 @@ class Engine:
 
     def _expose(self, step: Step) -> Exposed:
         """Take the frames of a step; raise `DeviceError` if an axis has moved meanwhile."""
-        exposed = self._exposer.expose(step, self._window(step))
+        exposed = self._exposer.expose(step, self._window(step.pose))
         self._positioner.require_in_place()
         return exposed
 
-    def _window(self, step: Step) -> Window:
-        patch = self._protocol.window
-        return window_at(step.pose.theta_r, self._pinhole, patch.width_mm, patch.height_mm)
+    def _window(self, pose: Pose) -> Window:
+        """Return the window at a pose; perpendicular to the sample if the view angle is unknown."""
+        patch, theta_r = self._protocol.window, pose.theta_r
+        known = 0.0 if math.isnan(theta_r) else theta_r
+        return window_at(known, self._pinhole, patch.width_mm, patch.height_mm)
 
     def _accept(self, exposed: Exposed | None) -> None:
         """Reduce the frames of a step and commit them to the record."""
@@ -221,7 +225,7 @@ class Engine:
         step, reading = exposed.step, self._measure(exposed)
         preview, files = None, list[str]()
         if step.preview:
-            preview = make_preview(exposed, self._window(step), self._rig.camera.max_dn)
+            preview = make_preview(exposed, self._window(step.pose), self._rig.camera.max_dn)
         if self._protocol.keep_frames:
             files = write_frames(exposed.frames, step.index, self._record.folder)
         self._record.add_reading(reading, preview, exposed.frames, files)
@@ -229,7 +233,7 @@ class Engine:
         self._on_step(step)
 
     def _measure(self, exposed: Exposed) -> Reading:
-        window, least = self._window(exposed.step), self._protocol.window.min_pixels
+        window, least = self._window(exposed.step.pose), self._protocol.window.min_pixels
         rig, theta_i_deg = self._rig, exposed.step.pose.theta_i
         placement = Placement(rig.u_placement_mm, theta_i_deg, rig.lamp_distance_mm)
         signal = measure(exposed.frames, exposed.dark, window, rig.camera, placement, least)

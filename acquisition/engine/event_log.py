@@ -12,16 +12,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 
-from instrument.record.event_kinds import RETRY, TROUBLE
+from instrument.record.event_kinds import INTERLOCK, RETRY, TROUBLE
 from instrument.record.record import Record
 
 LOGGERS = ("drivers", "acquisition", "sim", "instrument.record")
+INTERLOCKS = "acquisition.interlocks"  # its warnings are what the interlocks did
 
 
 class EventLogHandler(logging.Handler):
     """Queues messages until `write` records them: warnings as retries, errors as troubles.
 
-    `troubles`: the messages that have to be shown to a person as well.
+    Warnings of the interlocks have a kind of their own. `troubles`: the messages that have to be
+    shown to a person as well.
     """
 
     def __init__(self, record: Record) -> None:
@@ -41,8 +43,13 @@ class EventLogHandler(logging.Handler):
         while self._queue:
             message = self._queue.popleft()
             time_utc = datetime.fromtimestamp(message.created, UTC).isoformat()
-            kind = RETRY if message.levelno < logging.ERROR else TROUBLE
-            self._record.add_event(time_utc, kind, message.getMessage())
+            self._record.add_event(time_utc, _kind(message), message.getMessage())
+
+
+def _kind(message: logging.LogRecord) -> str:
+    if message.levelno >= logging.ERROR:
+        return TROUBLE
+    return INTERLOCK if message.name.startswith(INTERLOCKS) else RETRY
 
 
 @contextmanager

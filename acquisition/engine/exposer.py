@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from acquisition.engine.exposure_check import ExposureCheck
 from acquisition.engine.exposure_search import ExposureSearch
 from acquisition.engine.retrying_camera import RetryingCamera
+from acquisition.interlocks.darks import REFERENCE_FRAMES, DarkCheck
 from acquisition.measure.hot_pixels import hot_pixel_text
 from acquisition.measure.linearity import require_possible_times
 from acquisition.measure.radiometry import Dark, average_dark
@@ -20,10 +22,17 @@ from instrument.clock import Clock
 from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
 from instrument.devices import Frame, Lamp, Surface
-from instrument.errors import DeviceError
+from instrument.errors import DeviceError, Interlock
 from instrument.record.event_kinds import HOT, OPERATOR
 from instrument.record.reading import Reading
 from instrument.record.record import Record
+
+log = logging.getLogger("acquisition.interlocks")
+
+_LOOK_FOR_LIGHT = (
+    "light reaches the camera although the lamp is darkened: look at its shutter or lid, and for "
+    "light of the room"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +67,7 @@ class Exposer:
     record: Record
     on_pause: Callable[[], None]
     _check: ExposureCheck = field(init=False)
+    _dark_check: DarkCheck = field(init=False)
     _start_s: float = field(default=0.0, init=False)
     _search: ExposureSearch = field(init=False)
     _darks: dict[float, Dark] = field(default_factory=dict, init=False)
@@ -67,6 +77,7 @@ class Exposer:
     def __post_init__(self) -> None:
         target = self.protocol.exposure_target
         self._search = ExposureSearch(self.camera, self.rig.camera, target)
+        self._dark_check = DarkCheck(self.rig)
         self._check = ExposureCheck(self.rig.camera, self.clock, self.running_s, self.record)
 
     def restore(self, readings: Sequence[Reading]) -> None:
@@ -94,7 +105,7 @@ class Exposer:
         require_possible_times(frames)
         time_s = round((first_s + self.scan_s() - first.exposure_s) / 2, 3)
         utc = self.clock.utc().isoformat()
-        dark = self._dark(first.exposure_s)
+        dark = self._dark(first.exposure_s, window)
         self._check.require_proportional(tried, frames, self._darks, window)
         return Exposed(step, frames, dark, time_s=time_s, free_s=self.scan_s(), time_utc=utc)
 
@@ -124,14 +135,14 @@ class Exposer:
             return step.expected_exposure_s
         return self._search.exposure_s(last.peak_dn, last.exposure_s)
 
-    def _dark(self, exposure_s: float) -> Dark:
+    def _dark(self, exposure_s: float, window: Window) -> Dark:
         """Return the dark of an exposure; the scan time excludes darks repeated by a resume."""
         if exposure_s not in self._darks:
-            begun_s = self.running_s()
+            begun_s = self.scan_s()
             asked_s = self._search.asked_s(exposure_s)
-            self.take_darks((asked_s,))
+            self.take_darks((asked_s,), window)
             if exposure_s in self._used_before:
-                self._start_s += self.running_s() - begun_s
+                self._start_s += self.scan_s() - begun_s
         if exposure_s not in self._darks:
             now_s = self._search.taken_s[asked_s]
             raise DeviceError(
@@ -141,25 +152,55 @@ class Exposer:
             )
         return self._darks[exposure_s]
 
-    def take_darks(self, exposures_s: Sequence[float]) -> None:
-        """Darken the lamp, take the dark frames of these exposures, light it again."""
+    def take_darks(self, exposures_s: Sequence[float], window: Window) -> None:
+        """Darken the lamp, take the dark frames of these exposures, light it again.
+
+        Raises `Interlock` if there is light in them, seen in the window, at a second attempt too.
+        """
         if not exposures_s:
             return
-        self.lamp.darken()
-        self._note_cover("lamp covered for the darks")
-        for exposure_s in exposures_s:
-            self._search.set(exposure_s)
-            frames = self.camera.grab(self.protocol.dark_frames)
-            require_possible_times(frames)
-            dark = average_dark(frames, self.rig.camera)
-            self._darks[dark.exposure_s] = dark
-            mean, noise = float(dark.mean.mean()), float(np.sqrt(dark.variance.mean()))
-            time_utc = self.clock.utc().isoformat()
-            self.record.add_dark(time_utc, dark.exposure_s, dark.frames, mean, noise)
-            if dark.hot is not None:
-                self.record.add_event(time_utc, HOT, hot_pixel_text(dark.exposure_s, dark.hot))
+        darks = self._without_light(exposures_s)
+        if (found := self._dark_check.worst(darks, window)) is not None:
+            log.warning("interlock darks: %s: taken again", found.text())
+            self._dark_check.forget_reference()
+            darks = self._without_light(exposures_s)
+            if (found := self._dark_check.worst(darks, window)) is not None:
+                raise Interlock(f"interlock darks: {found.text()}; {_LOOK_FOR_LIGHT}")
+        for dark in darks:
+            self._keep(dark, window)
         self.lamp.light()
         self._note_cover("lamp uncovered")
+
+    def _without_light(self, exposures_s: Sequence[float]) -> list[Dark]:
+        """Darken the lamp and return the darks of these exposures."""
+        self.lamp.darken()
+        self._note_cover("lamp covered for the darks")
+        reference_s = self._dark_check.reference_s(exposures_s)
+        if reference_s is not None:
+            begun_s = self.running_s()
+            self._dark_check.set_reference([self._grab_dark(reference_s, REFERENCE_FRAMES)])
+            self._start_s += self.running_s() - begun_s  # no scan time
+        darks = [self._grab_dark(e, self.protocol.dark_frames) for e in exposures_s]
+        self._dark_check.set_reference(darks)
+        return darks
+
+    def _grab_dark(self, exposure_s: float, count: int) -> Dark:
+        self._search.set(exposure_s)
+        frames = self.camera.grab(count)
+        require_possible_times(frames)
+        return average_dark(frames, self.rig.camera)
+
+    def _keep(self, dark: Dark, window: Window) -> None:
+        """Record a dark, and use it from now on."""
+        found = self._dark_check.excess(dark, window)
+        if found.light_dn > 0:
+            log.warning("interlock darks: %s: subtracted, and taken as uncertain", found.text())
+        self._darks[dark.exposure_s] = replace(dark, light_dn=found.light_dn)
+        mean, noise = float(dark.mean.mean()), float(np.sqrt(dark.variance.mean()))
+        time_utc = self.clock.utc().isoformat()
+        self.record.add_dark(time_utc, dark.exposure_s, dark.frames, mean, noise)
+        if dark.hot is not None:
+            self.record.add_event(time_utc, HOT, hot_pixel_text(dark.exposure_s, dark.hot))
 
     def _note_cover(self, text: str) -> None:
         if self.rig.lamp.darkened_by == "hand":

@@ -130,7 +130,8 @@ def dark_at(
         above = known.mean - camera.black_level_dn
         mean = camera.black_level_dn + above * (exposure_s / known.exposure_s)
         u = abs(float(above.mean())) / 2
-    return Dark(exposure_s, mean, known.variance, known.frames, known.hot), u
+    light_dn = max(dark.light_dn for dark in near)
+    return Dark(exposure_s, mean, known.variance, known.frames, known.hot, light_dn), u
 
 
 def require_possible_times(frames: Sequence[Frame]) -> None:

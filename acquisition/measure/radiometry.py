@@ -27,7 +27,8 @@ SATURATED_SHARE, HOT_SHARE = 0.001, 0.01
 class Dark:
     """Dark of one exposure: `mean` (rows, columns) in DN, `variance` in DN^2, over `frames`.
 
-    `hot` (rows, columns): True for a hot pixel, which does not count; None for none.
+    `hot` (rows, columns): True for a hot pixel, which does not count; None for none. `light_dn`:
+    light in it, see `acquisition.interlocks.darks`.
     """
 
     exposure_s: float
@@ -35,6 +36,7 @@ class Dark:
     variance: FloatArray
     frames: int
     hot: BoolArray | None = None
+    light_dn: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,6 +92,8 @@ def measure(
     dark_mean, dark_variance = dark.mean[window.crop], dark.variance[window.crop]
     rounding, u_rounding = dark_rounding_dn(dark_mean, dark_variance, window.weights, dark.frames)
     u_dark_noise = _u_noise(window, dark_variance / dark.frames)
+    # In another pose the light in a dark is between none and twice as much, with equal probability.
+    u_light = dark.light_dn * float(window.weights.sum()) / math.sqrt(3.0)
     u_placement, u_texture = placement_u_dn(frames, dark.mean, window, placement)
     u_hot = hot_share * _spread(mean - dark_mean, window)
     # A saturated pixel is short of its true count by up to full scale, or more.
@@ -98,7 +102,7 @@ def measure(
         signal_dn=window.mean(mean - dark_mean + rounding),
         u_noise_dn=_u_noise(window, variance / len(frames)),
         u_quantisation_dn=_u_rounding(window.mean(mean), camera),
-        u_dark_dn=float(np.hypot(u_dark_noise, u_rounding)),
+        u_dark_dn=math.hypot(u_dark_noise, u_rounding, u_light),
         u_placement_dn=u_placement,
         u_texture_dn=math.hypot(u_texture, u_hot, u_saturated),
         window_pixels=window.pixels,
