@@ -14,6 +14,7 @@ from instrument.text.text_file import TextFile, input_error
 
 HEADER = "a header with theta_i_deg, theta_r_deg, dphi_deg, brdf and, where known, u_brdf"
 ROWS = "a row for each geometry"
+_JSON = f"is a JSON file; allowed: a table as text (CSV); write its values as a table, {ROWS}"
 MAX_COLUMNS = 1000
 _OTHER_UNIT = re.compile(r"\bm?rad\b|%")  # a new name alone would not convert the values
 _SEARCHED_LINES = 100
@@ -52,6 +53,8 @@ def read_header(file: TextFile, rows: Iterator[tuple[int, str]]) -> Header:
     try:
         fields = list(fields_of(text))
     except QuoteError as error:
+        if _begins_like_json(text):
+            raise _refused(file, line, 1, _JSON) from None
         raise _refused(file, line, error.column, f"header: {error}") from None
     names = [name.strip() for _, name in fields]
     separator = _other_separator(text, names)
@@ -69,6 +72,10 @@ def _refused(file: TextFile, line: int, column: int, text: str) -> InputError:
     return input_error(file)
 
 
+def _begins_like_json(text: str) -> bool:
+    return text.lstrip().startswith(("{", "["))
+
+
 def _other_separator(text: str, names: list[str]) -> str | None:
     """Separator of the names other than the comma; None if it is the comma, or not known."""
     needed = {column.name for column in NEEDED}
@@ -81,6 +88,8 @@ def _other_separator(text: str, names: list[str]) -> str | None:
 
 def _check_names(file: TextFile, line: int, names: list[str], starts: list[int]) -> None:
     missing = [column.name for column in NEEDED if column.name not in names]
+    if len(missing) == len(NEEDED) and _begins_like_json(names[0]):
+        raise _refused(file, line, 1, _JSON)
     renamed = _renamed(names)
     if len(missing) == len(NEEDED) and not renamed:
         raise _refused(file, line, 1, _no_header(file, line, names))

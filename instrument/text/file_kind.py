@@ -17,7 +17,6 @@ _SHEET = 'save its sheet as "CSV UTF-8 (comma delimited)"'
 _WORKBOOK = FileKind("an Excel workbook", _SHEET)
 _WEB_PAGE = FileKind("a web page (HTML)", "download the file that it links to, not the page")
 _RECORD = FileKind("a SQLite database", "of a run, name the folder")
-_JSON = FileKind("a JSON file", "write its values as a table, a row for each geometry")
 _UTF_16 = FileKind("text in UTF-16", 'save it as "CSV UTF-8", or as UTF-8 in an editor')
 _PICTURE = "name a table of the values that it shows"
 _EXPORT = "export its table as CSV in the program that wrote it"
@@ -49,7 +48,7 @@ _SEARCHED = 64 * 1024  # bytes in which the names of a ZIP's members are looked 
 def foreign_kind(raw: bytes) -> FileKind | None:
     """Return the kind of a file that is no plain UTF-8 table or YAML text, None for others.
 
-    JSON is no kind of its own here, as YAML contains it: see `json_kind`.
+    JSON is no kind of its own here: YAML contains it, and a table's first name may begin like it.
     """
     for beginning, kind in _BEGINNINGS.items():
         if raw.startswith(beginning):
@@ -62,11 +61,6 @@ def foreign_kind(raw: bytes) -> FileKind | None:
     if text.startswith(b"<?xml"):
         return _WEB_PAGE if _HTML.search(text) else _XML
     return None
-
-
-def json_kind(raw: bytes) -> FileKind | None:
-    """Return the kind of a JSON file, None for others."""
-    return _JSON if _beginning_of_text(raw).startswith((b"{", b"[")) else None
 
 
 def _kind_of_archive(raw: bytes) -> FileKind:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from instrument.errors import InputError
 from instrument.text.atomic_file import read_file
-from instrument.text.file_kind import foreign_kind, json_kind
+from instrument.text.file_kind import foreign_kind
 from instrument.text.quoting import printable, shown
 
 MAX_BYTES = 64 * 1024**2  # about 150 000 rows of a run's measurements.csv
@@ -78,7 +78,7 @@ def read_text(path: Path, *, pipe: bool = False) -> TextFile:
     """
     name = printable(str(path))
     raw = _bytes(path, name, pipe).removeprefix(b"\xef\xbb\xbf")
-    kind = foreign_kind(raw) or json_kind(raw)
+    kind = foreign_kind(raw)
     if kind is not None:
         raise InputError(
             f"{name}:1:1: is {kind.name}; allowed: a table as text (CSV); {kind.advice}"

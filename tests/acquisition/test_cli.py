@@ -16,7 +16,7 @@ from tests.support.command import gonio_here as gonio
 from tests.support.paths import CONFIGS
 from tests.support.scans import small_demo
 
-DEADLINE_S = 60.0
+DEADLINE_S = 300.0
 PROTOCOL = CONFIGS / "protocols" / "demo.yaml"
 
 

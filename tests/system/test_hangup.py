@@ -21,7 +21,7 @@ from tests.support.stages.hangup_child import PROTOCOL
 
 pytestmark = pytest.mark.waits
 
-DEADLINE_S = 60.0
+DEADLINE_S = 300.0
 ON_THE_WIRE_S = 0.5  # measured: 5 ms; the bound is for a busy machine
 
 

@@ -22,7 +22,7 @@ from tests.support.command import gonio as gonio_process
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import small_demo
 
-DEADLINE_S = 60.0
+DEADLINE_S = 300.0
 METADATA = "{sample_id: F-17, operator: Jürgen, wavelength_nm: 550, notes: 'two, \"three\"'}"
 
 

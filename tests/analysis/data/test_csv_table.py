@@ -341,3 +341,18 @@ def test_many_rows_are_read_quickly() -> None:
     assert (
         took / count < 100e-6
     )  # about 6e-6 s per row on an idle machine; only a gross slowdown fails
+
+
+@pytest.mark.parametrize("first", ["[lamp]", "{}", "[1", "{a"])
+def test_a_name_that_begins_like_json_makes_no_json_file(first: str) -> None:
+    m = read(f"{first},{','.join(NAMES[:4])}\nx,30,10,0,0.2\n")
+    assert m.brdf.tolist() == [0.2]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ['["theta_i_deg", "brdf"]', "[\n{", '{"theta_i_deg": [30], "brdf": [0.2]}', "[[30, 0.2]]"],
+)
+def test_json_is_named_whatever_it_holds(text: str) -> None:
+    with pytest.raises(InputError, match="is a JSON file; allowed: a table as text"):
+        read(text)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from instrument.text.file_kind import foreign_kind, json_kind
+from instrument.text.file_kind import foreign_kind
 from tests.support.analysis.csv_texts import NAMES
 from tests.support.paths import CONFIGS
 
@@ -14,7 +14,6 @@ from tests.support.paths import CONFIGS
 def test_a_table_is_no_other_kind(names: list[str], before: str) -> None:
     raw = (before + ",".join(names)).encode()
     assert foreign_kind(raw) is None
-    assert json_kind(raw) is None
 
 
 def test_a_configuration_file_is_no_other_kind() -> None:

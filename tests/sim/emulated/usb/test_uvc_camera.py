@@ -145,6 +145,7 @@ def test_exposure_and_gain_reach_the_picture() -> None:
             assert pixels(frames[0], 64, 48, "Y16")[0, 1] == 240
 
 
+@pytest.mark.real_time
 def test_a_sensor_delay_shows_in_the_frames() -> None:
     """Of the frames after a change, exactly those in the pipeline have the exposure before it."""
     with imported_camera(delay_frames=5) as bench:
