@@ -25,7 +25,7 @@ def home_axis(axis: str, rig_path: Path | None, yes: bool) -> None:
     _motor(axis, rig)
     with orderly_end(), OpenRig(rig) as open_rig:
         stage = open_rig.axis(axis)
-        _confirm(rig, yes, f"{stage.identity()}\n{axis} will look for its reference.")
+        _confirm(rig, yes, f"{stage.identity()}\n{axis}{_at(stage)} will look for its reference.")
         with _stopped_at_an_error(stage):
             stage.home()
         _print_position(axis, stage.position_deg())
@@ -54,6 +54,14 @@ def move_axis(axis: str, angle_deg: float, rig_path: Path | None, yes: bool) -> 
                 stage.start_move(move.angle_deg)
                 stage.finish_move()
         _print_position(axis, stage.position_deg())
+
+
+def _at(axis: Axis) -> str:
+    """Return the angle at which an axis is found, empty if its reference is not known."""
+    try:
+        return f", found at {axis.position_deg():.4f} deg,"
+    except DeviceError:  # it is named where the motion is refused
+        return ""
 
 
 @contextmanager

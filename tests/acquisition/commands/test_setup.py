@@ -181,3 +181,5 @@ def test_nothing_real_moves_before_somebody_has_said_so(real_rig: Path) -> None:
         assert bench.motor.referenced
         moved = gonio("move", "theta_r", "1.5", "--rig", real_rig, "--yes")
         assert "theta_r will move from 0.0000 to 1.5 deg" in moved.stderr
+        homed = gonio("home", "theta_r", "--rig", real_rig, "--yes")
+        assert "theta_r, found at 1.5000 deg, will look for its reference" in homed.stderr

@@ -27,6 +27,7 @@ from tests.support.stop_trials.true_motor import TrueMotor
 
 STEPS_PER_DEG = 1000.0
 _BEYOND_DEG = 5.0  # of the controller's own limits, beyond those of the rig file
+_APPROACH_DEG = 1.0
 _TICK_S = 0.01
 _XOFF = b"\x13"
 
@@ -82,10 +83,18 @@ class Devices:
             self._wire.send_noise(_XOFF)
 
     def await_motion(self, kind: str, number: int, seconds: float) -> dict[str, Any] | None:
-        """Return the motion of this kind and number, None if it does not begin in time."""
+        """Return the motion of this kind and number, None if it does not begin in time.
+
+        Short moves, by which a target is approached from one side, are not counted.
+        """
         until_s = time.monotonic() + seconds
         while True:
-            found = [motion for motion in self.motor.motions if motion.kind == kind]
+            found = [
+                motion
+                for motion in self.motor.motions
+                if motion.kind == kind
+                and (kind == "home" or abs(motion.to_deg - motion.from_deg) > _APPROACH_DEG)
+            ]
             if len(found) >= number:
                 return asdict(found[number - 1])
             if time.monotonic() > until_s:

@@ -208,10 +208,17 @@ class _Course:
             time.sleep(0.05)
 
     def _start_again(self) -> tuple[int | None, str]:
-        """Run the command with which a person would go on, and end it if it takes long."""
+        """Run the command with which a person would go on; a scan is stopped once it moves."""
+        before = len(self._bench.ask("log")["motions"])
         arguments = next_arguments(self._trial, self._folder)
         again = Program(self._folder, arguments, self._trial.real_start)
         try:
+            until_s = time.monotonic() + ENDS_WITHIN_S
+            while self._trial.command == "run" and not again.await_end(time.monotonic() + 0.1):
+                begun = self._bench.ask("log")["motions"][before:]
+                if time.monotonic() > until_s or any(m["kind"] != "brake" for m in begun):
+                    again.strike("SIGTERM")
+                    break
             again.await_end(time.monotonic() + ENDS_WITHIN_S)
             return again.code, again.text
         finally:

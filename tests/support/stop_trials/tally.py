@@ -28,8 +28,10 @@ def tree(outcomes: Sequence[Outcome]) -> str:
     cells: dict[tuple[str, str], list[Outcome]] = defaultdict(list)
     for outcome in outcomes:
         cells[outcome.trial.fault, outcome.trial.motion].append(outcome)
-    head = ("fault", "motion", "trials", "stood", "said", "ended", "finished", "exceptions",
-            "longest/s", "beyond braking/s", "machine/s")  # fmt: skip
+    head = (
+        "fault", "motion", "trials", "in motion", "stood", "said", "ended", "finished",
+        "exceptions", "longest/s", "beyond braking/s", "machine/s",
+    )  # fmt: skip
     rows = [head, *(_row(key, cells[key]) for key in sorted(cells, key=_order)),
             _row(("all", ""), list(outcomes))]  # fmt: skip
     widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
@@ -47,6 +49,7 @@ def _row(key: tuple[str, str], outcomes: list[Outcome]) -> tuple[str, ...]:
     return (
         *key,
         str(len(verdicts)),
+        str(sum(v.moved for v in verdicts)),
         *map(str, ways),
         str(sum(bool(v.exceptions) for v in verdicts)),
         f"{max((v.after_s for v in stood), default=0.0):.2f}",

@@ -27,6 +27,7 @@ class Trial:
 
     `signal` is empty where only the fault itself may end the command. `moment` is a part of the
     motion's duration at which the signal is sent, or the fault begins where it comes without one;
+    `number` of the motion, counted from 1; for a disk, of the one before.
     `ahead_s` is how long before a signal its fault begins. `at` is the place in a message, as a
     part of its length, and `seconds` the duration of a fault, infinite where it stays.
     """
@@ -90,8 +91,15 @@ def draw(seed: int) -> Trial:
         homing_s=rng.uniform(0.6, 2.0) if motion == "homing" else 0.2,
         start_deg=start,
         target_deg=target,
-        number=rng.choice((1, 2)) if command == "run" and motion == "moving" else 1,
+        number=_number(rng, fault, command, motion),
     )
+
+
+def _number(rng: random.Random, fault: str, command: str, motion: str) -> int:
+    """Return the number of the motion; a scan's first readings wait for the disk before a move."""
+    if fault in ON_DISK:
+        return rng.choice((1, 2, 2, 3, 3, 3))
+    return rng.choice((1, 2)) if command == "run" and motion == "moving" else 1
 
 
 def _way(rng: random.Random) -> tuple[float, float]:

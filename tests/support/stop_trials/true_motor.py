@@ -72,8 +72,9 @@ class TrueMotor(Motor):
     @property
     def _speed_deg_per_s(self) -> float:
         since_s = self._clock.now_s() - self._start_s
-        before, after = (self._move.travelled_deg(since_s + dt) for dt in (-_STEP_S, _STEP_S))
-        return (after - before) / (2 * _STEP_S)
+        begin_s, end_s = max(since_s - _STEP_S, 0.0), since_s + _STEP_S
+        covered_deg = self._move.travelled_deg(end_s) - self._move.travelled_deg(begin_s)
+        return covered_deg / (end_s - begin_s)
 
     def move(self, angle_deg: float) -> None:
         with self._lock:
