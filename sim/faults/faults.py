@@ -5,6 +5,10 @@
 plans one fault for this process; `;` separates several. Each names a device, its fault, and the
 moment: at or after the n-th call of a device's method. `gonio resume` without the variable
 continues with sound devices.
+
+    GONIO_FAULTS="world lamp 0.95 at camera.grab 30; world lamp 1 at camera.grab 60"
+
+makes the lamp dim for a while, which no device reports: see `sim.defects.world` for the names.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ from typing import Any, TypeVar
 from instrument.config.axes import AXES, SimulatedAxis
 from instrument.devices import Camera, Lamp, Operator, Stage
 from instrument.errors import InputError
+from sim.defects.world import SOUND
 from sim.faults.faulty_devices import (
     FaultyCamera,
     FaultyDevice,
@@ -27,7 +32,7 @@ from sim.faults.faulty_devices import (
 from sim.faults.triggers import Triggers, When
 from sim.scene.scene import Scene
 
-VARIABLE = "GONIO_FAULTS"
+VARIABLE, WORLD = "GONIO_FAULTS", "world"
 FAULTS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(AXES, FaultyStage.faults),
     "camera": FaultyCamera.faults,
@@ -67,6 +72,16 @@ class Faults:
 
         self.triggers.plan(when, call, number, make_fail)
 
+    def plan_world(self, fault: str, value: str, when: When, call: str, number: int) -> None:
+        """Plan a fault of `sim.defects.world`, with its size; raise `ValueError` without one."""
+        SOUND.changed(fault, value)
+
+        def change() -> None:
+            if self.scene is not None:
+                self.scene.world = self.scene.world.changed(fault, value)
+
+        self.triggers.plan(when, call, number, change)
+
     def stage(self, name: str, stage: Stage, axis: SimulatedAxis, scene: Scene) -> Stage:
         """Wrap the stage of axis `name`."""
         self.scene = scene
@@ -90,11 +105,24 @@ class Faults:
 
     def _plan_text(self, text: str) -> None:
         found = _FAULT.fullmatch(text)
+        if found is not None and found[1] == WORLD:
+            self._plan_world_text(text, found)
+            return
         if found is None or found[2] not in FAULTS.get(found[1], ()):
             allowed = "; ".join(f"{name}: {', '.join(words)}" for name, words in FAULTS.items())
             raise InputError(
                 f"{VARIABLE}: {text!r}; allowed: DEVICE FAULT at|after DEVICE.CALL NUMBER, as in "
                 f"'theta_r stalls at theta_r.wait 5', with {allowed}"
             )
-        when: When = "at" if found[3] == "at" else "after"
-        self.plan(found[1], found[2], when, found[4], int(found[5]))
+        self.plan(found[1], found[2], _when(found), found[4], int(found[5]))
+
+    def _plan_world_text(self, text: str, found: re.Match[str]) -> None:
+        fault, _, value = found[2].partition(" ")
+        try:
+            self.plan_world(fault, value, _when(found), found[4], int(found[5]))
+        except ValueError as error:
+            raise InputError(f"{VARIABLE}: {text!r}: {error}") from None
+
+
+def _when(found: re.Match[str]) -> When:
+    return "at" if found[3] == "at" else "after"

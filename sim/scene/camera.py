@@ -14,7 +14,7 @@ class SimulatedCamera:
     """Camera with the properties, and the defects, given in the rig file."""
 
     def __init__(self, scene: Scene, clock: Clock) -> None:
-        self._sensor, self._clock = Sensor(scene), clock
+        self._scene, self._sensor, self._clock = scene, Sensor(scene), clock
         self._settings, self._defects = scene.rig.camera, scene.rig.simulation.camera_defects
         self._set_s = self._settings.min_exposure_s
 
@@ -46,9 +46,11 @@ class SimulatedCamera:
         """Do nothing: there is nothing to release."""
 
     def _frame(self) -> Frame:
-        exposure_s = true_exposure_s(self._set_s, self._defects)
+        world = self._scene.world
+        set_s = self._set_s * world.control
+        exposure_s = true_exposure_s(set_s, self._defects) * world.exposure
         self._clock.sleep(self._settings.frame_overhead_s + exposure_s / 2)
         image = self._sensor.picture(exposure_s)  # in the middle: the mean of a drifting lamp
         self._clock.sleep(exposure_s / 2)
         taken = limit_range(image, self._defects)
-        return Frame(taken, read_back_s(self._set_s, self._defects), self._clock.now_s())
+        return Frame(taken, read_back_s(set_s, self._defects), self._clock.now_s())

@@ -19,6 +19,7 @@ from analysis.data.acceptance import Acceptance, radiance, required_rings
 from instrument.geometry import FloatArray
 from instrument.pinhole import Pinhole, apply_homography, rectangle_mm
 from instrument.pixel_coverage import Coverage, polygon_coverage
+from sim.defects.picture import scattered
 from sim.scene.scene import Scene
 
 _NODES = 9  # per side: interpolation error below 4e-5 of the radiance, 5e-6 of an image's mean
@@ -44,23 +45,25 @@ def electrons_per_s(scene: Scene) -> FloatImage:
         (rig.camera.height_px, rig.camera.width_px), _background_radiance(scene), dtype=np.float32
     )
     crop = projection.outline.crop
-    if projection.outline.fraction.size:
+    if projection.outline.fraction.size and scene.mounted is not None:
         covered = projection.outline.fraction.astype(np.float32)
         image[crop] += covered * (_surface_radiance(scene, projection) - image[crop])
     image *= _response(Pinhole.of(rig), rig.lamp.white_electrons_per_s)
-    return image
+    return scattered(image, scene.world)
 
 
 def _project(scene: Scene) -> _Projection:
     pinhole, size = Pinhole.of(scene.rig), scene.size
-    homography = pinhole.homography(scene.true_deg["theta_r"], scene.heights_mm[scene.surface])
+    height_mm = 0.0 if scene.mounted is None else scene.heights_mm[scene.mounted]
+    homography = pinhole.homography(scene.seen_deg()["theta_r"], height_mm)
+    homography = homography @ scene.world.placement()
     corners = apply_homography(homography, rectangle_mm(size.width_mm, size.height_mm))
     return _Projection(homography, polygon_coverage(corners, pinhole.width_px, pinhole.height_px))
 
 
 def _background_radiance(scene: Scene) -> float:
     """Radiance of the dark optical table behind the sample, taken as Lambertian."""
-    cos_i = max(0.0, float(np.cos(np.radians(scene.true_deg["theta_i"]))))
+    cos_i = max(0.0, float(np.cos(np.radians(scene.seen_deg()["theta_i"]))))
     return scene.rig.simulation.background_reflectance / np.pi * cos_i
 
 
@@ -75,7 +78,7 @@ def _surface_radiance(scene: Scene, projection: _Projection) -> FloatImage:
     to_plane: FloatArray = np.linalg.inv(projection.homography).astype(np.float64)
     values = _radiance_at(scene, apply_homography(to_plane, pixels))
     smooth: FloatImage = (matrix_y @ values.astype(np.float32)) @ matrix_x.T
-    if scene.surface == "sample" and scene.sample.mottling > 0:
+    if scene.mounted == "sample" and scene.sample.mottling > 0:
         smooth *= 1 + _texture(scene, projection)
     return smooth
 
@@ -91,9 +94,10 @@ def _chebyshev_grid(pixels: int) -> tuple[FloatArray, FloatImage]:
 
 def _radiance_at(scene: Scene, points_mm: FloatArray) -> FloatArray:
     """Radiance at points (..., 2) of the surface, seen from the lens."""
-    height = np.full(points_mm.shape[:-1], scene.heights_mm[scene.surface])
+    seen_deg = scene.seen_deg()
+    height = np.full(points_mm.shape[:-1], scene.heights_mm[scene.mounted or "sample"])
     flat = np.dstack([points_mm, height]).reshape(-1, 3)
-    angles = (scene.true_deg["theta_i"], scene.true_deg["theta_r"], scene.true_deg["dphi"])
+    angles = (seen_deg["theta_i"], seen_deg["theta_r"], seen_deg["dphi"])
     values = radiance(scene.brdf(), flat, *angles, _acceptance(scene), _rings(scene))
     return values.reshape(points_mm.shape[:-1])
 
@@ -108,12 +112,13 @@ def _rings(scene: Scene) -> int:
     The largest number that any whole degree within 1 degree of the view angle needs; computed once
     for each place of the lamp.
     """
-    theta_i, dphi = scene.true_deg["theta_i"], scene.true_deg["dphi"]
-    key = (scene.surface, theta_i, dphi)
+    seen_deg = scene.seen_deg()
+    theta_i, dphi = seen_deg["theta_i"], seen_deg["dphi"]
+    key = (scene.mounted or "", theta_i, dphi)
     if key not in scene.rings:
         acceptance = _acceptance(scene)
         scene.rings[key] = required_rings(scene.brdf(), theta_i, _VIEW_ANGLES_DEG, dphi, acceptance)
-    near = np.abs(_VIEW_ANGLES_DEG - scene.true_deg["theta_r"]) <= 1.0
+    near = np.abs(_VIEW_ANGLES_DEG - seen_deg["theta_r"]) <= 1.0
     return int(scene.rings[key][near].max(initial=1))
 
 

@@ -22,8 +22,12 @@ from instrument.config.axes import AXES, HandAxis
 from instrument.config.protocol import PatchConfig, Protocol, Sample, SimulatedSample, WhiteTile
 from instrument.config.rig import Rig
 from instrument.devices import Surface
-from instrument.geometry import Brdf, FloatArray, IntArray
+from instrument.geometry import Brdf, FloatArray, IntArray, lamp_direction
 from sim.clock import SimulatedClock
+from sim.defects.world import SOUND, World
+
+# Place of an axis before it is first set by hand: no picture counts yet, but a dark may show light.
+_UNSET_DEG = {"theta_i": 30.0, "dphi": 0.0, "theta_r": 0.0}
 
 
 def stream_key(name: str) -> int:
@@ -39,7 +43,8 @@ class Scene:
     true_deg: true angle of each axis in degrees; it differs from the commanded one by the axis
     error. clock: by which the lamp drifts. rings: see `sim.scene.render`; cache of the averaging
     needed for each place of the lamp. heights_mm: height of each surface above the rotation axis;
-    that of the tile is drawn from the rig's uncertainty of placement.
+    that of the tile is drawn from the rig's uncertainty of placement. world: faults that no device
+    reports.
     """
 
     rig: Rig
@@ -53,6 +58,7 @@ class Scene:
     clock: Clock = field(default_factory=SimulatedClock)
     true_deg: dict[str, float] = field(default_factory=dict)
     rings: dict[tuple[str, float, float], IntArray] = field(default_factory=dict)
+    world: World = SOUND
     _texture: FloatArray | None = None
     heights_mm: dict[Surface, float] = field(init=False)
     _lamp_start_s: float = 0.0
@@ -113,12 +119,25 @@ class Scene:
         error_deg = u_deg * self.random(stream_key(axis), key).standard_normal()
         self.true_deg[axis] = float(angle_deg + error_deg)
 
+    @property
+    def mounted(self) -> Surface | None:
+        """Surface on the table: the one that was asked for, unless the world is at fault."""
+        if self.world.mounted == "nothing":
+            return None
+        return self.surface if self.world.mounted == "as asked" else self.world.mounted
+
+    def seen_deg(self) -> dict[str, float]:
+        """Return the true angles of the axes from the normal of the surface, with all faults."""
+        true_deg = {**_UNSET_DEG, **self.true_deg}
+        own = {name: a + getattr(self.world, f"{name}_deg") for name, a in true_deg.items()}
+        return own if not self.world.tilt_deg else _tilted(own, self.world.tilt_deg)
+
     def brdf(self) -> Brdf:
         """Return the BRDF of the mounted surface.
 
         The function takes a `Geometry` of any shape and returns an array of that shape in 1/sr.
         """
-        if self.surface == "sample":
+        if self.mounted == "sample":
             if self.sample.method == "auto":
                 return adequate_brdf(self.sample.model, self.sample.parameters)
             model, parameters = MODELS[self.sample.model], self.sample.parameters
@@ -148,7 +167,7 @@ class Scene:
         spacing_mm = self.sample.mottling_size_mm / 3.0
         rows = int(np.ceil(size.height_mm / spacing_mm)) + 1
         columns = int(np.ceil(size.width_mm / spacing_mm)) + 1
-        if self.surface != "sample" or self.sample.mottling == 0:
+        if self.mounted != "sample" or self.sample.mottling == 0:
             return np.zeros((rows, columns)), spacing_mm
         if self._texture is None:
             self._texture = self._make_texture(rows, columns)
@@ -161,3 +180,15 @@ class Scene:
         smooth -= smooth.mean()
         texture: FloatArray = smooth * (self.sample.mottling / smooth.std())
         return texture
+
+
+def _tilted(angles_deg: dict[str, float], tilt_deg: float) -> dict[str, float]:
+    """Return the angles from a normal that leans by `tilt_deg` to the side of positive theta_r."""
+    x, y, z = lamp_direction(angles_deg["theta_i"], angles_deg["dphi"])
+    tilt = np.radians(tilt_deg)
+    across, up = x * np.cos(tilt) - z * np.sin(tilt), x * np.sin(tilt) + z * np.cos(tilt)
+    return {
+        "theta_i": float(np.degrees(np.arctan2(np.hypot(across, y), up))),
+        "dphi": float(np.degrees(np.arctan2(abs(y), across))),
+        "theta_r": angles_deg["theta_r"] - tilt_deg,
+    }

@@ -8,10 +8,12 @@ import numpy as np
 from instrument.config.camera import CameraConfig
 from instrument.devices import Image
 from sim.defects.camera import hot_electrons_per_s
+from sim.defects.picture import distorted, mixed_up, stray_electrons_per_s
+from sim.defects.world import SOUND
 from sim.scene.render import FloatImage, electrons_per_s
 from sim.scene.scene import Scene, stream_key
 
-_SceneState = tuple[object, ...]  # surface and true angles: all that a rendered image depends on
+_SceneState = tuple[object, ...]  # surface, true angles and faults: all that an image depends on
 
 
 class Sensor:
@@ -39,27 +41,37 @@ class Sensor:
         self._expected = (self._light, self._light)
         self._noise = np.empty(shape, np.float32)
         self._counts = np.empty(shape, np.uint16)
+        self._last: Image | None = None
 
     def picture(self, exposure_s: float) -> Image:
         """Return an image of the scene in its present state, (height, width) in counts.
 
         The expected counts are reused while scene, exposure and lamp level (to 1e-6) stay the same.
         """
+        self._count_frame(exposure_s)
+        world, settings = self.scene.world, self._settings
         mean, spread = self._mean_and_spread_dn(exposure_s)
-        noise = self._standard_normal(exposure_s)
+        noise = self._standard_normal()
         np.multiply(noise, spread, out=noise)
+        if world.noise != 1.0:
+            noise *= np.float32(world.noise)
         cv2.add(noise, mean, dst=self._counts, dtype=cv2.CV_16U)  # rounds, and saturates at 0
-        counts = np.minimum(self._counts, self._settings.max_dn)
-        return counts.astype(np.uint8) if self._settings.bit_depth == 8 else counts
+        counts = np.minimum(self._counts, settings.max_dn)
+        image: Image = counts.astype(np.uint8) if settings.bit_depth == 8 else counts
+        if world is not SOUND:
+            image = distorted(image, world, settings)
+            image = mixed_up(image, self._frame_number, self._last, world, settings)
+        self._last = image
+        return image
 
     def _mean_and_spread_dn(self, exposure_s: float) -> tuple[FloatImage, FloatImage]:
         """Expected counts of each pixel and their standard deviation, before rounding."""
         scene = self.scene
-        level = round(scene.lamp_level(), 6) if scene.lit else 0.0
-        state = (scene.surface, *sorted(scene.true_deg.items()))
+        level = round(scene.lamp_level(), 6) * scene.world.light(scene.lit) * self._flicker()
+        state = (scene.surface, *sorted(scene.true_deg.items()), scene.world)
         key = (state, exposure_s, level)
         if key != self._expected_key:
-            light = self._light_of(state) if scene.lit else self._no_light
+            light = self._light_of(state) if level else self._no_light
             self._expected = self._expected_dn(light, level, exposure_s)
             self._expected_key = key
         return self._expected
@@ -76,24 +88,39 @@ class Sensor:
         s = self._settings
         electrons = light * np.float32(level * exposure_s)
         electrons += np.float32(s.dark_current_electrons_per_s * exposure_s)
+        if self.scene.world is not SOUND:
+            white = self.scene.rig.lamp.white_electrons_per_s
+            stray = stray_electrons_per_s(self.scene.world, s, white)
+            electrons += stray * np.float32(exposure_s)
         if self._hot is not None:
             electrons += (self._hot * exposure_s).astype(np.float32)
         np.minimum(electrons, np.float32(s.full_well_electrons), out=electrons)
         spread = np.sqrt(electrons + np.float32(s.read_noise_electrons**2))
-        gain = np.float32(1 / s.electrons_per_dn)
+        gain = np.float32(self.scene.world.gain / s.electrons_per_dn)
         spread *= gain
         electrons *= gain
         electrons += np.float32(s.black_level_dn)
         return electrons, spread
 
-    def _standard_normal(self, exposure_s: float) -> FloatImage:
-        """Standard normal noise; OpenCV's generator is four times as fast here as NumPy's."""
+    def _flicker(self) -> float:
+        """Return the factor of the lamp's light in this frame."""
+        sigma = self.scene.world.flicker
+        if not sigma:
+            return 1.0
+        random = self.scene.random(stream_key("flicker"), *self._series[1:], self._frame_number)
+        return 1.0 + sigma * float(random.standard_normal())
+
+    def _count_frame(self, exposure_s: float) -> None:
+        """Find the key of the next frame's noise."""
         scene = self.scene
         step_key = (stream_key("frame"), scene.step) if scene.lit else (stream_key("dark"),)
         series = (scene.rig.simulation.seed, *step_key, round(exposure_s * 1e9))
         self._frame_number = self._frame_number + 1 if series == self._series else 0
         self._series = series
-        key = [*series, self._frame_number]
+
+    def _standard_normal(self) -> FloatImage:
+        """Standard normal noise; OpenCV's generator is four times as fast here as NumPy's."""
+        key = [*self._series, self._frame_number]
         cv2.setRNGSeed(int(np.random.SeedSequence(key).generate_state(1)[0] >> 1))
         cv2.randn(self._noise, np.zeros(1), np.ones(1))
         return self._noise
