@@ -64,6 +64,12 @@ class HandSetAxis:
         """Return infinite limits: only the rig file's apply."""
         return -math.inf, math.inf
 
+    def begin_stop(self) -> None:
+        """Do nothing: there is no motor to stop."""
+
+    def finish_stop(self) -> None:
+        """Do nothing: there is no motor to stop."""
+
     def stop(self) -> None:
         """Do nothing: there is no motor to stop."""
 

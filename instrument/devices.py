@@ -80,8 +80,17 @@ class Stage(Protocol):
     def limits_deg(self) -> tuple[float, float]:
         """Return the smallest and the largest angle in degrees that the axis accepts."""
 
+    def begin_stop(self) -> None:
+        """Send a stop now and return; may be called at any time, twice, and from another thread."""
+
+    def finish_stop(self) -> None:
+        """Return once the axis was read to stand; repeat a stop without effect until then.
+
+        Raise `DeviceError`, in a bounded time, if it still moves or cannot be read.
+        """
+
     def stop(self) -> None:
-        """Stop all motion now; may be called at any time, twice, and from another thread."""
+        """Begin and finish a stop."""
 
     def close(self) -> None:
         """Release the device; may be called twice."""

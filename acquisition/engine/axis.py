@@ -81,8 +81,16 @@ class Axis:
         if not isinstance(self._settings, HandAxis):
             self._clock.sleep(self._settings.settle_s)
 
+    def begin_stop(self) -> None:
+        """Send a stop now, without waiting for its effect; from any thread."""
+        self._stage.begin_stop()
+
+    def finish_stop(self) -> None:
+        """Return once the axis was read to stand; raise `DeviceError` if that is not confirmed."""
+        self._stage.finish_stop()
+
     def stop(self) -> None:
-        """Stop all motion immediately."""
+        """Stop all motion, and return once the axis was read to stand."""
         self._stage.stop()
 
     def close(self) -> None:

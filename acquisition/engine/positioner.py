@@ -53,7 +53,9 @@ class Positioner:
         Returns the angles in degrees at which the others were found.
         """
         for axis in self._axes.values():
-            axis.stop()
+            axis.begin_stop()
+        for axis in self._axes.values():
+            axis.finish_stop()
         motors = {name: axis for name, axis in self._axes.items() if not axis.by_hand}
         found = {}
         for name, axis in motors.items():
@@ -146,12 +148,14 @@ class Positioner:
     def make_safe(self) -> None:
         """Stop every axis and close the shutter, even if some of them fail.
 
-        What moves is stopped first: a stop may wait for a port that has vanished. An action
-        interrupted by a Ctrl-C is repeated, and the interruption is logged.
+        All stops are sent, that of what moves first, before it is waited until the axes were read
+        to stand. An action interrupted by a Ctrl-C is repeated, and the interruption is logged.
         """
         names = sorted(AXES, key=lambda name: name != self._moving)
+        axes = [(name, self._axes[name]) for name in names if name in self._axes]
         actions: list[tuple[str, Callable[[], None]]] = [
-            (name, self._axes[name].stop) for name in names if name in self._axes
+            *((name, axis.begin_stop) for name, axis in axes),
+            *((name, axis.finish_stop) for name, axis in axes),
         ]
         if self._rig.lamp.darkened_by == "shutter":
             actions.append(("lamp", self._lamp.darken))

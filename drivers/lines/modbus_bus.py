@@ -22,11 +22,10 @@ from drivers.lines.modbus_client import BusSettings, Client, client_for
 from drivers.lines.priority_lock import PriorityLock
 from drivers.lines.serial_line import (
     BY_ID,
-    REOPEN_EVERY_S,
-    REOPEN_S,
     SLOW_LINE,
     Garbled,
     NoReply,
+    PortClosed,
     PortGone,
     names_one_device,
 )
@@ -94,18 +93,13 @@ class ModbusBus(Closeable):
         self._closed = True
         self._close_client()
 
-    @property
-    def closed(self) -> bool:
-        """True once the program has closed the line."""
-        return self._closed
-
     def open(self, who: str, at_any_path: bool = False) -> None:
         """Open the port unless it is open; one that was lost, if its path names one device.
 
         A numbered name may belong to another device by then: it is opened again for a stop only.
         """
         if self._closed:
-            raise PortGone(f"{who}: {self.port}: it was closed by this program")
+            raise PortClosed(f"{who}: {self.port}: it was closed by this program")
         if self._gone and not (self._follows_device or at_any_path):
             raise self._port_gone(who, self._gone)
         try:
@@ -241,27 +235,14 @@ class ModbusUnit:
         self._in_step(send, until_s)
 
     def write_at_once(self, register: int, value: int) -> None:
-        """Write one register before all queued exchanges, even if the device is out of step.
+        """Write one register, once, before all queued exchanges, even if out of step.
 
-        It is sent up to three times, until it is acknowledged, and for up to `REOPEN_S` over a port
-        that comes back: only for what is safe to repeat.
+        Also over a port that was lost and is back: only for what is safe to repeat. Raises
+        `AnswerLost` if it is not acknowledged.
         """
-
-        until_s, tries_left = self._bus.clock.now_s() + REOPEN_S, TRIES
-        while True:
-            try:
-                with self._bus.lock.hold(urgent=True):
-                    self._write_one(register, value)
-                    return self._bus.release_foreign()
-            except PortGone:
-                if self._bus.closed or self._bus.clock.now_s() > until_s:
-                    raise
-                self._bus.clock.sleep(REOPEN_EVERY_S)
-            except AnswerLost as lost:
-                log.warning("%s", lost)
-                tries_left -= 1
-                if not tries_left:
-                    raise
+        with self._bus.lock.hold(urgent=True):
+            self._write_one(register, value)
+            self._bus.release_foreign()
 
     def _in_step(self, action: Callable[[], T], until_s: float) -> T:
         """Resynchronise if necessary, then act; the lock is released after every step."""

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import serial
 
 WRITE_S = 0.5  # pyserial also counts the time for which a busy computer suspends the process
+HELD_S = 0.01  # 10 bytes at 9600 baud: a line that has sent none in that time is held
 REOPEN_S, REOPEN_EVERY_S = 2.0, 0.05  # a stop waits so long for a port that has vanished
 ECHO = "returns every request, as a two-wire RS-485 adapter may: the echo is skipped"
 SLOW_LINE = ", or give a slow line more time (reply_s in the rig file)"
@@ -41,6 +42,10 @@ T = TypeVar("T")
 
 class PortGone(DeviceError):
     """The port vanished or cannot be used: unplugged, in use, or not permitted."""
+
+
+class PortClosed(PortGone):
+    """The port was closed by this program."""
 
 
 class NoReply(DeviceError):
@@ -146,29 +151,29 @@ class Line(Closeable):
         self._on_port(lambda port: self._write(port, data))
 
     def write_at_once(self, data: bytes) -> None:
-        """Send a stop, ahead of everything; for up to `REOPEN_S` over a port that comes back.
+        """Send a stop, once, ahead of everything; also over a port that was lost and is back.
 
         It waits for no answer, except on an adapter that echoes: there it would destroy one.
         """
         with self.lock.hold(urgent=True) if self.echoes else contextlib.nullcontext():
-            until_s = self._clock.now_s() + REOPEN_S
-            while not self._sent_at_once(data, until_s):
-                self._clock.sleep(REOPEN_EVERY_S)
-
-    def _sent_at_once(self, data: bytes, until_s: float) -> bool:
-        """Send a stop; False if the port is gone but may come back before `until_s`."""
-        try:
             self._open_again()
-            self._on_port(self._restart_output)
+            self._on_port(self._free_output)
             self.write(data)
-        except (PortGone, NoReply):
-            if self._closed or self._clock.now_s() > until_s:
-                raise
-            return False
-        if self.openings > 1 and not self._follows_device:
-            self._on_port(lambda port: port.flush())
-            self._release(self._serial)  # good for a stop only
-        return True
+            if self.openings > 1 and not self._follows_device:
+                self._on_port(lambda port: port.flush())
+                self._release(self._serial)  # good for a stop only
+
+    def _free_output(self, port: serial.Serial) -> None:
+        """Discard bytes that the system holds back, so that a stop does not wait behind them.
+
+        Bytes that are on their way are left alone: half a command would spoil the stop after it.
+        """
+        held = getattr(port, "out_waiting", 0)
+        if held:
+            self._clock.sleep(HELD_S)
+            if port.out_waiting == held:
+                port.reset_output_buffer()
+        self._restart_output(port)
 
     def _restart_output(self, port: serial.Serial) -> None:
         """Go on sending although an XOFF has come: one byte of noise would hold the line for good.
@@ -294,7 +299,7 @@ class Line(Closeable):
         port = self._serial
         if port is None:
             if self._closed:
-                raise PortGone(f"{self.who}: {self.port}: it was closed by this program")
+                raise PortClosed(f"{self.who}: {self.port}: it was closed by this program")
             raise self._gone("it was lost")
         try:
             return action(port)

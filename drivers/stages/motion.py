@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 from instrument.kinematics import Trapezoid
@@ -9,6 +10,7 @@ from instrument.kinematics import Trapezoid
 STARTS_WITHIN_S = 0.5  # some controllers still report ready just after the command
 STALLED_S = 1.0  # reported as moving, but at the same position
 LONG_S = 1.0  # moves of this duration show whether the controller's speed is the rig file's
+ASTRAY_DEG = 1.0  # beyond the way of a move: more than overshoot, or an approach from one side
 TOO_FAST, TOO_SLOW = 0.9, 1.25  # of the duration that follows from speed and acceleration
 
 
@@ -39,48 +41,94 @@ class Status:
     fault: str = ""
 
 
-class _Monitor:
-    """Checks that a motion begins, or that its command is sent again."""
+class Monitor(ABC):
+    """Judges a motion by each status: has it begun, has it ended, is something wrong.
+
+    `problem` says what is wrong and what to look at, or is empty. One thread at a time calls `see`.
+    """
+
+    NEEDS_REFERENCE = True
+    """False while the reference is being searched for."""
 
     def __init__(self, started_s: float) -> None:
-        self._started_s = started_s
-        self._begun = self._resent = False
+        self._started_s = self._sent_s = self._seen_s = started_s
+        self._resent = False
+        self.begun = self.ended = False
+        self.problem = ""
 
-    def should_resend(self, time_s: float) -> bool:
+    def sent(self, time_s: float) -> None:
+        """Note that the command was sent before a time of the clock: it takes effect from then."""
+        self._sent_s = time_s
+
+    def see(self, now: Status, time_s: float) -> None:
+        """Take a status into account; `time_s` is a time of the clock just before it."""
+        self._seen_s = time_s
+        self.begun |= self._shows_motion(now, time_s)
+        self.ended = self._at_end(now)
+        self.problem = "" if self.ended else self._problem(now, time_s)
+
+    def should_resend(self) -> bool:
         """True once, if the stage should be moving by now and is not."""
-        late = not self._begun and not self._resent and time_s - self._started_s > STARTS_WITHIN_S
-        self._resent |= late
-        return late
+        late = not self.begun and self._seen_s - self._sent_s > STARTS_WITHIN_S
+        if self._resent or not late:
+            return False
+        self._resent = True
+        return True
+
+    @property
+    def may_begin_until_s(self) -> float:
+        """Time of the clock until which a motion that has not been seen may still begin."""
+        return self._started_s if self.begun else self._sent_s + STARTS_WITHIN_S
+
+    def _never_began(self, time_s: float) -> bool:
+        """True once the second command has moved nothing either; the first may have been lost."""
+        return not self.begun and self._resent and time_s - self._sent_s > STARTS_WITHIN_S
+
+    @abstractmethod
+    def _shows_motion(self, now: Status, time_s: float) -> bool:
+        """Return whether a status shows that the motion has begun."""
+
+    @abstractmethod
+    def _at_end(self, now: Status) -> bool:
+        """Return whether the motion has ended as it should."""
+
+    @abstractmethod
+    def _problem(self, now: Status, time_s: float) -> str:
+        """Return a description of what is wrong, or an empty text."""
 
 
-class HomingMonitor(_Monitor):
+class HomingMonitor(Monitor):
     """Checks that homing begins and ends in time; `again`: the reference was known before."""
+
+    NEEDS_REFERENCE = False
 
     def __init__(self, allowed_s: float, started_s: float, again: bool) -> None:
         super().__init__(started_s)
         self._allowed_s, self._known = allowed_s, again
 
-    def ended(self, now: Status) -> bool:
-        """True once the reference is known and the stage stands."""
-        self._begun |= now.moving
+    def _shows_motion(self, now: Status, time_s: float) -> bool:
+        del time_s
+        return now.moving
+
+    def _at_end(self, now: Status) -> bool:
+        """Return True once the reference is known and the stage stands."""
         self._known &= now.homed and not now.moving
         return now.homed and not now.moving and not self._known
 
-    def problem(self, time_s: float) -> str:
-        """Return a description of what is wrong, or an empty text."""
-        since_s = time_s - self._started_s
-        if not self._begun and since_s > 2 * STARTS_WITHIN_S:
-            return "did not begin to look for its reference: look at its motor's supply"
-        if since_s > self._allowed_s:
+    def _problem(self, now: Status, time_s: float) -> str:
+        where = f", at {now.position_deg:g} deg"
+        if self._never_began(time_s):
+            return f"did not begin to look for its reference: look at its motor's supply{where}"
+        if time_s - self._started_s > self._allowed_s:
             return (
                 f"its reference was not found within {self._allowed_s:g} s: look at the reference "
-                "switch, and whether something holds the stage"
+                f"switch, and whether something holds the stage{where}"
             )
         return ""
 
 
-class MoveMonitor(_Monitor):
-    """Checks that a move begins, makes progress, and ends in time."""
+class MoveMonitor(Monitor):
+    """Checks that a move begins, makes progress on its way, and ends in time."""
 
     def __init__(self, limits: Limits, start: float, target: float, started_s: float) -> None:
         super().__init__(started_s)
@@ -92,30 +140,38 @@ class MoveMonitor(_Monitor):
         self._start = self._at = start
         self._at_s = started_s
 
-    def ended(self, now: Status, time_s: float) -> bool:
-        """True once the stage stands, unless the move has not begun yet.
-
-        `time_s` is a time just before the status.
-        """
-        self._begun |= now.moving or abs(now.position_deg - self._start) > self._step_deg
+    def _shows_motion(self, now: Status, time_s: float) -> bool:
         if now.moving:
             self._moved_s = time_s - self._started_s
-        off_deg = abs(now.position_deg - self._target)
-        return not now.moving and (self._begun or off_deg <= self._limits.tolerance_deg)
+        return now.moving or abs(now.position_deg - self._start) > self._step_deg
 
-    def problem(self, now: Status, time_s: float) -> str:
-        """Return a description of what is wrong with the move, or an empty text."""
+    def _at_end(self, now: Status) -> bool:
+        """Return True once the stage stands, unless the move has not begun yet."""
+        off_deg = abs(now.position_deg - self._target)
+        return not now.moving and (self.begun or off_deg <= self._limits.tolerance_deg)
+
+    def _problem(self, now: Status, time_s: float) -> str:
         if abs(now.position_deg - self._at) > self._step_deg:
             self._at, self._at_s = now.position_deg, time_s
-        since_s = time_s - self._started_s
+        since_s = time_s - self._sent_s
         where = f"at {now.position_deg:g} deg on the way to {self._target:g} deg"
+        if self._astray_deg(now.position_deg) > ASTRAY_DEG:
+            return (
+                f"runs astray, {where} from {self._start:g} deg: look at its encoder, and at what "
+                "else commands it, then home it"
+            )
         if now.moving and time_s - self._at_s > STALLED_S:
             return f"stalled {where}: look for what holds the stage, then home it"
-        if not self._begun and since_s > 2 * STARTS_WITHIN_S:
+        if self._never_began(time_s):
             return f"did not begin to move, {where}: look at its motor's supply"
-        if since_s > self._allowed_s:
+        if self.begun and since_s > self._allowed_s:
             return f"still {where} after {since_s:.1f} s (allowed: {self._allowed_s:.1f} s)"
         return ""
+
+    def _astray_deg(self, at_deg: float) -> float:
+        """Return how far beyond the way between start and target a position is, in degrees."""
+        low, high = sorted((self._start, self._target))
+        return max(low - at_deg, at_deg - high)
 
     def speed_problem(self, arrived_s: float) -> str:
         """Return a description of a speed that is not the rig file's, or an empty text.

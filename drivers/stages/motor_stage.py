@@ -8,10 +8,19 @@ from __future__ import annotations
 
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from drivers.stages.motion import LONG_S, STALLED_S, HomingMonitor, Limits, MoveMonitor, Status
+from drivers.stages.motion import (
+    LONG_S,
+    STALLED_S,
+    HomingMonitor,
+    Limits,
+    Monitor,
+    MoveMonitor,
+    Status,
+)
+from drivers.stages.stopping import VerifiedStop
 from drivers.stages.watchdog import Watchdog
 from instrument.clock import Clock
 from instrument.closeable import Closeable
@@ -47,9 +56,12 @@ class MotorStage(ABC):
     ) -> None:
         self.name, self._limits, self._clock, self._line = name, limits, clock, line
         self._target_deg: float | None = None
-        self._from_deg = 0.0
-        self._started_s = 0.0
+        self._motion: Monitor | None = None
         self._stopped = self._speed_known = False
+        self._stop = VerifiedStop(
+            name, limits, clock, reply_s, send=self._send_stop, send_harder=self._send_harder_stop,
+            status=self._status_after_stop, wanted=lambda: self._stopped,
+        )  # fmt: skip
         self.watchdog = Watchdog(name, self._probe, self._stop_unwatched, clock, reply_s)
 
     # To be provided by a driver.
@@ -80,7 +92,18 @@ class MotorStage(ABC):
 
     @abstractmethod
     def _send_stop(self) -> None:
-        """End all motion, ahead of everything that waits for the line."""
+        """Tell the controller once to end all motion, ahead of everything that waits for the line.
+
+        Raise `DeviceError` if it cannot be told, or if it does not acknowledge what it should.
+        """
+
+    def _send_harder_stop(self) -> None:
+        """End a motion that earlier stops have not ended, by a controller's harder stop."""
+        self._send_stop()
+
+    def _status_after_stop(self) -> Status:
+        """Read the status once, quickly enough that a stop can be repeated in time."""
+        return self.status(retry=False)
 
     def _own_settings(self) -> dict[str, str]:
         """Return the controller's settings, apart from its limits."""
@@ -160,27 +183,11 @@ class MotorStage(ABC):
 
     def _find_reference(self, again: bool) -> None:
         self._stopped, self._target_deg = False, None
+        self._motion = HomingMonitor(self._limits.homing_s, self._clock.now_s(), again)
         self.watchdog.begin()
-        try:
-            self._monitor_homing(again)
-        finally:
-            self.watchdog.end()
-
-    def _monitor_homing(self, again: bool) -> None:
-        self._send_home()
-        self._repeat_stop()
-        time_s = self._clock.now_s()
-        monitor = HomingMonitor(self._limits.homing_s, time_s, again)
-        while not monitor.ended(now := self._poll()):
-            if monitor.should_resend(time_s):
-                log.warning("%s: stands still: homing command sent again", self.name)
-                self._send_home()  # it stands and has no reference: the command never arrived
-            problem = monitor.problem(time_s)
-            if problem:
-                self.stop()
-                raise DeviceError(f"{self.name}: {problem}, at {now.position_deg:g} deg")
-            self._clock.sleep(POLL_S)
-            time_s = self._clock.now_s()  # before the status: it is then judged by no later time
+        self._send(self._send_home)
+        self._monitor(self._motion, "homing command", self._send_home)
+        self.watchdog.end()
 
     def start_move(self, angle_deg: float) -> None:
         """Start a move to an angle in degrees.
@@ -192,46 +199,40 @@ class MotorStage(ABC):
         self._refuse_fault(now)
         if not now.homed:
             raise DeviceError(f"{self.name}: not homed, so it must not move: home it first")
-        self._stopped = False
-        self._from_deg, self._target_deg = now.position_deg, angle_deg
-        self._started_s = self._clock.now_s()
+        self._stopped, self._target_deg = False, angle_deg
+        self._motion = MoveMonitor(self._limits, now.position_deg, angle_deg, self._clock.now_s())
         self.watchdog.begin()
-        try:
-            with self._explained():
-                self._send_move(angle_deg)
-            self._repeat_stop()
-        except BaseException:
-            self.watchdog.end()
-            raise
+        with self._explained():
+            self._send(lambda: self._send_move(angle_deg))
 
     def wait(self) -> float:
         """Wait for the end of the move; check the position and return it, in degrees."""
-        if self._target_deg is None:
+        motion, target_deg = self._motion, self._target_deg
+        if target_deg is None or not isinstance(motion, MoveMonitor):
             return self.position_deg()
-        try:
-            return self._monitor_move(self._target_deg)
-        finally:
-            self.watchdog.end()
-
-    def _monitor_move(self, target_deg: float) -> float:
-        monitor = MoveMonitor(self._limits, self._from_deg, target_deg, self._started_s)
-        time_s = self._clock.now_s()
-        while not monitor.ended(now := self._poll(), time_s):
-            self._refuse_lost_reference(now)
-            if monitor.should_resend(time_s):
-                log.warning("%s: stands still: move to %g deg sent again", self.name, target_deg)
-                self._send_move(target_deg)  # it has not moved: the command never arrived
-                self._repeat_stop()
-            problem = monitor.problem(now, time_s)
-            if problem:
-                self._target_deg = None
-                self.stop()
-                raise DeviceError(f"{self.name}: {problem}")
-            self._clock.sleep(POLL_S)
-            time_s = self._clock.now_s()  # before the status: it is then judged by no later time
+        what = f"move to {target_deg:g} deg"
+        now = self._monitor(motion, what, lambda: self._send_move(target_deg))
         arrived_deg = self._check_arrival(now)
-        self._check_speed(monitor)
+        self._check_speed(motion)
+        self.watchdog.end()
         return arrived_deg
+
+    def _monitor(self, motion: Monitor, what: str, resend: Callable[[], None]) -> Status:
+        """Return the status at the end of a motion; if anything else ends it, it is watched on."""
+        while True:
+            now = self._poll()
+            if motion.ended:
+                return now
+            if motion.NEEDS_REFERENCE:
+                self._refuse_lost_reference(now)
+            if motion.should_resend():
+                log.warning("%s: stands still: %s sent again", self.name, what)
+                self._send(resend)  # the command never arrived
+            if motion.problem:
+                self._target_deg = None
+                self._stop_or_report()
+                raise DeviceError(f"{self.name}: {motion.problem}")
+            self._clock.sleep(POLL_S)
 
     def _check_speed(self, monitor: MoveMonitor) -> None:
         """Compare the first long move since the speed was set with its duration."""
@@ -248,16 +249,40 @@ class MotorStage(ABC):
         if self._line is not None:
             self._line.close()
 
-    def stop(self) -> None:
-        """End all motion now; safe at any time, repeatedly, and from any thread."""
+    def begin_stop(self) -> None:
+        """Send a stop now, ahead of everything; at any time, repeatedly, and from any thread.
+
+        It does not wait: whether the stage stands, `finish_stop` says.
+        """
         self._stopped = True
         self.watchdog.end()
-        self._send_stop()
+        self._stop.begin()
+
+    def finish_stop(self) -> None:
+        """Return once the stage was read to stand; a stop that has no effect is sent again.
+
+        Raise `DeviceError` if it still moves, or cannot be read, after the time to brake.
+        """
+        motion = self._motion
+        self._stop.finish(motion.may_begin_until_s if motion else 0.0)
+
+    def stop(self) -> None:
+        """End all motion, and return once the stage was read to stand."""
+        self.begin_stop()
+        self.finish_stop()
+
+    def _observe(self, retry: bool = True) -> Status:
+        """Read the status, and have the motion judged by it."""
+        time_s = self._clock.now_s()
+        now = self.status(retry)
+        if self._motion is not None:
+            self._motion.see(now, time_s)
+        return now
 
     def _poll(self) -> Status:
         """Return the status during a motion; raise if there is a fault or the stage was stopped."""
         with self._explained():
-            now = self.watchdog.poll(self.status)
+            now = self.watchdog.poll(self._observe)
         self._raise_if_unwatched()
         if self._stopped:
             self._target_deg = None
@@ -280,46 +305,44 @@ class MotorStage(ABC):
             self.watchdog.check()  # its own thread may wake later than this one
             if not self.watchdog.fired:
                 raise
-            kind = ComputerPaused if self.watchdog.paused_s else type(error)
-            raise kind(f"{error}; {self._no_status}") from error
+            kind = ComputerPaused if self.watchdog.no_fault else type(error)
+            raise kind(f"{error}; {self.watchdog.why}") from error
 
     def _raise_if_unwatched(self) -> None:
-        """Raise, once the watchdog has stopped the stage, what was to blame: computer or line."""
+        """Raise what was to blame once the watchdog has stopped the stage."""
         if not self.watchdog.fired:
             return
-        self._target_deg = None
-        if self.watchdog.paused_s:
+        self._target_deg, why = None, self.watchdog.why
+        if self.watchdog.no_fault:
             raise ComputerPaused(
-                f"{self.name}: {self._no_status}: look at what else runs on this computer, and at "
-                "its power saving"
+                f"{self.name}: {why}: look at what else runs on this computer, and at its power "
+                "saving"
             )
-        raise DeviceError(f"{self.name}: {self._no_status}: look at its cable, then home it")
+        look = "" if ": look" in why else ": look at its cable, then home it"
+        raise DeviceError(f"{self.name}: {why}{look}")
 
-    @property
-    def _no_status(self) -> str:
-        silent_s, paused_s = self.watchdog.silent_s, self.watchdog.paused_s
-        why = (
-            f"the computer paused for {paused_s:.1f} s"
-            if paused_s
-            else f"no status for {silent_s:g} s"
-        )
-        return f"{why} while it moved, so it was told to stop"
+    def _probe(self) -> str | None:
+        """Ask for the status without retries; return what is wrong with the motion, "" if nothing.
 
-    def _probe(self) -> bool:
-        """Ask for the status without retries; True if the controller answers."""
+        None if the controller does not answer.
+        """
         try:
-            self.status(retry=False)
+            self._observe(retry=False)
         except DeviceError as error:
             log.warning("%s", error)
-            return False
-        return True
+            return None
+        return self._motion.problem if self._motion else ""
 
     def _stop_unwatched(self) -> None:
-        """Stop a motion of which no status was received; never raises."""
+        """Stop a motion that the watchdog objects to; never raises."""
+        self._stop_or_report(f"{self.watchdog.why}; ")
+
+    def _stop_or_report(self, why: str = "") -> None:
+        """Stop where another error is on its way; that the stop failed is reported by the log."""
         try:
             self.stop()
         except DeviceError as error:
-            log.error("%s: %s; the stop failed too: %s", self.name, self._no_status, error)
+            log.error("%s: %s%s", self.name, why, error)
 
     def _check_arrival(self, now: Status) -> float:
         self._refuse_lost_reference(now)
@@ -332,11 +355,14 @@ class MotorStage(ABC):
             )
         return now.position_deg
 
-    def _repeat_stop(self) -> None:
-        """Repeat a stop that came while a command was being sent, and raise `Stopped`."""
+    def _send(self, command: Callable[[], None]) -> None:
+        """Send a motion command; repeat a stop that came meanwhile, and raise `Stopped`."""
+        command()
+        if self._motion is not None:
+            self._motion.sent(self._clock.now_s())
         self.watchdog.check_for_pause()
         if self._stopped:
-            self._send_stop()
+            self._stop_or_report()  # the first stop may have come before the command
             self._raise_if_unwatched()
             raise Stopped(f"{self.name}: stopped as it was about to move")
 

@@ -39,7 +39,7 @@ class NewportPort:
 
     def __init__(self, line: Line, address: int, who: str, clock: Clock) -> None:
         self.line, self.address, self.who, self._clock = line, address, who, clock
-        self._deaf = False
+        self._deaf = self._stopped = False
         self.version, self.stage, self._openings = "", "", line.openings
         self.version = self.query("VE", str)
 
@@ -61,6 +61,7 @@ class NewportPort:
         """
         with self.line.lock.hold():
             self._clean()
+            self._forget_error()
             try:
                 self.line.write(framing.command(self.address, letters, value))
                 self._clock.sleep(_DEAF_S if self._deaf else 0.0)
@@ -76,8 +77,19 @@ class NewportPort:
             )
 
     def stop(self) -> None:
-        """Stop this axis, without the lock: ST has no answer, and the line is full duplex."""
+        """Stop this axis, without the lock: ST has no answer, and the line is full duplex.
+
+        No harder one is known: whether MM0, which disables the motor, is accepted during a motion
+        could not be verified, and a beam without current may fall.
+        """
+        self._stopped = True
         self.line.write_at_once(framing.command(self.address, "ST"))
+
+    def _forget_error(self) -> None:
+        """Read the error that a stop may have left which arrived spoilt; it is kept until read."""
+        if self._stopped:
+            self._stopped = False
+            self._query_once("TE", str, "")
 
     def _query_once(self, letters: str, parse: Callable[[str], T], value: str) -> T:
         self._clean()

@@ -43,7 +43,7 @@ class OrientalStage(MotorStage):
                 f"({0.5 / steps_per_deg:g} deg) cannot be kept"
             )
         super().__init__(name, limits, clock, reply_s=bus.settings.reply_s)
-        self._unit, self._steps_per_deg = unit, steps_per_deg
+        self._unit, self._steps_per_deg, self._reply_s = unit, steps_per_deg, bus.settings.reply_s
         self._drive = ModbusUnit(bus, name, unit, framing.DIRECT_DATA, _RESYNC_COUNTS)
         self._stops, self._cleared = 0, -1  # stops sent; how many of them are cleared in 007D
         self._target_steps = self._identify()
@@ -54,7 +54,9 @@ class OrientalStage(MotorStage):
 
     def status(self, retry: bool = True) -> Status:
         """Read the output word, then the feedback position."""
-        until_s = self._drive.deadline_s() if retry else self._clock.now_s()
+        return self._status(self._drive.deadline_s() if retry else self._clock.now_s())
+
+    def _status(self, until_s: float) -> Status:
         output = self._output(until_s)  # first: the position read after it is then one at rest
         return Status(
             framing.degrees_of(self._feedback(until_s), self._steps_per_deg),
@@ -62,6 +64,10 @@ class OrientalStage(MotorStage):
             homed=output.has(framing.HOME_END),
             fault=output.fault,
         )
+
+    def _status_after_stop(self) -> Status:
+        """Read the status, with the time to get in step again after a lost answer."""
+        return self._status(self._clock.now_s() + 2 * self._reply_s)
 
     def _own_limits_deg(self) -> tuple[float, float]:
         """Return infinite limits: the registers of an AZ drive's software limits are not known."""
@@ -110,7 +116,7 @@ class OrientalStage(MotorStage):
         try:
             self._drive.write_at_once(framing.INPUT_WORD, framing.STOP)
         except AnswerLost as lost:
-            raise type(lost)(f"{lost}; STOP was not acknowledged: it may still move") from lost
+            raise type(lost)(f"{lost}; STOP was not acknowledged") from lost
 
     def _wait_until_ready(self, purpose: str) -> None:
         """Clear an earlier stop, and wait until the drive accepts commands."""

@@ -93,9 +93,9 @@ class ZaberPort:
             )
         self._openings = self.line.openings
 
-    def stop(self) -> None:
+    def stop(self, command: str = "stop") -> None:
         """Stop this axis, without the lock: the line is full duplex, and the reply is ignored."""
-        self.line.write_at_once(framing.command(self.device, self.axis, _STOP_ID, "stop"))
+        self.line.write_at_once(framing.command(self.device, self.axis, _STOP_ID, command))
 
     def _own_reply(self, line: bytes, axis: int, number: int) -> Reply | None:
         reply = framing.reply_of(line, require_checksum=False)
@@ -222,3 +222,7 @@ class ZaberStage(MotorStage):
 
     def _send_stop(self) -> None:
         self._port.stop()
+
+    def _send_harder_stop(self) -> None:
+        """End the motion without a ramp: estop, which public programs send; seen on no device."""
+        self._port.stop("estop")

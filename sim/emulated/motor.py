@@ -6,7 +6,7 @@ import threading
 from dataclasses import dataclass, replace
 
 from instrument.clock import Clock
-from instrument.kinematics import Trapezoid
+from instrument.kinematics import Braking, Trapezoid
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +32,7 @@ class Motor:
         self.mechanics, self._clock = mechanics, clock
         self._lock = threading.RLock()
         self._start_deg = mechanics.home_deg + 0.37  # any position but home
-        self._move = self._trapezoid(0.0)
+        self._move: Trapezoid | Braking = self._trapezoid(0.0)
         self._start_s = clock.now_s()
         self._homing_until_s: float | None = None
         self._held_deg: float | None = None
@@ -68,7 +68,7 @@ class Motor:
     def home(self) -> None:
         """Start searching for the reference."""
         with self._lock:
-            self.stop()
+            self.halt()
             self.referenced = False
             duration_s = float("inf") if self.homing_fails else self.mechanics.homing_s
             self._homing_until_s = self._clock.now_s() + duration_s
@@ -96,6 +96,15 @@ class Motor:
             self._move = self._trapezoid(0.0)
 
     def stop(self) -> None:
+        """Brake by the set acceleration; a search for the reference stops at once."""
+        with self._lock:
+            now_s = self._clock.now_s()
+            speed = self._move.speed_at(now_s - self._start_s) if self._held_deg is None else 0.0
+            self.halt()
+            self._move = Braking(speed, self.mechanics.acceleration_deg_per_s2)
+            self._start_s = now_s
+
+    def halt(self) -> None:
         """Stop at the current position."""
         with self._lock:
             self._start_deg, self._homing_until_s = self.position_deg, None
@@ -118,13 +127,13 @@ class Motor:
     def lose_power(self) -> None:
         """Restart the controller: the axis stops and has no reference."""
         with self._lock:
-            self.stop()
+            self.halt()
             self.referenced = False
 
     def fail(self, alarm: str) -> None:
         """Stop with a fault, given as the controller's own code."""
         with self._lock:
-            self.stop()
+            self.halt()
             self.alarm = alarm
 
     def _finish_homing(self) -> None:

@@ -88,16 +88,19 @@ class NewportController:
         return None
 
     def _act(self, letters: str, value: str) -> None:
+        error = "@"
         if letters == "PA":
-            self._error = self._move(value)
+            error = self._move(value)
         elif letters == "OR":
-            self._error = self._home()
+            error = self._home()
         elif letters == "ST":
             self.motor.stop()
         elif letters in ("VA", "AC"):
-            self._error = self._set(letters, value)
+            error = self._set(letters, value)
         else:
-            self._error = "A"
+            error = "A"
+        if error != "@":
+            self._error = error  # kept until TE reads it
 
     def _home(self) -> str:
         if self._state() != _NOT_REFERENCED:

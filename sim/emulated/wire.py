@@ -48,6 +48,7 @@ class Wire(Closeable):
     """Passes bytes to the controllers and their answers back; subclasses implement the port.
 
     `seen`: time (monotonic, in s) and bytes of each message received from the master.
+    `spoil_request` turns such a message into what reaches the controllers.
     """
 
     def __init__(self, controllers: Sequence[Controller]) -> None:
@@ -57,6 +58,7 @@ class Wire(Closeable):
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self.seen: list[tuple[float, bytes]] = []
+        self.spoil_request: Callable[[bytes], bytes] = lambda data: data
         self._thread.start()
 
     def inject(self, *faults: Fault | None) -> None:
@@ -99,6 +101,7 @@ class Wire(Closeable):
                 self._faults.popleft()
         if lost:
             return
+        data = self.spoil_request(data)
         answer = b"".join(controller.answer(data) for controller in self._controllers)
         if answer:
             self._send_with_fault(answer)

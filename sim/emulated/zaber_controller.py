@@ -5,7 +5,8 @@ Transcripts: replies have the form that the tests of the maker's MATLAB toolbox 
 library zproto; the maker's library zaber-motion drives this stage in the tests. A reply carries a
 checksum if the setting comm.checksum is 1, and not because the command had one: the maker's
 libraries read both forms, and public programs set it. Not verified on a device: that last rule, the
-value of deviceid (59999 is of no real device), and the time of a reply (here none).
+value of deviceid (59999 is of no real device), the time of a reply (here none), and that estop,
+which public programs send, ends a motion without a ramp.
 """
 
 from __future__ import annotations
@@ -85,9 +86,9 @@ class ZaberController:
         command, _, rest = words.partition(" ")
         if command == "":
             return "OK", "0"
-        if command == "stop":
+        if command in ("stop", "estop"):
             self._interrupted |= self.motor.moving
-            self.motor.stop()
+            (self.motor.stop if command == "stop" else self.motor.halt)()
             return "OK", "0"
         if command == "warnings":
             flags = self._warnings()

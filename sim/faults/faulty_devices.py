@@ -121,11 +121,18 @@ class FaultyStage(FaultyDevice[Stage]):
         with self._call("limits_deg"):
             return self._device.limits_deg()
 
-    def stop(self) -> None:
+    def begin_stop(self) -> None:
         """End the move at the current position."""
         with self._call("stop"):
             self._device.stop()
             self._write_scene()
+
+    def finish_stop(self) -> None:
+        """Do nothing: a simulated stage stands at once."""
+
+    def stop(self) -> None:
+        """End the move at the current position."""
+        self.begin_stop()
 
     def close(self) -> None:
         """Do nothing: there is nothing to release."""

@@ -72,6 +72,13 @@ class SimulatedStage:
         """Return the rig file's limits in device degrees."""
         return self._axis.device_limits_deg()
 
+    def begin_stop(self) -> None:
+        """End the move at the current position."""
+        self._halt()
+
+    def finish_stop(self) -> None:
+        """Do nothing: a simulated stage stands at once."""
+
     def stop(self) -> None:
         """End the move at the current position."""
         self._halt()

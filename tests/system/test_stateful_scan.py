@@ -108,7 +108,7 @@ class Tripwire:
         if len(self.calls) > self.at and error is not None and self._fits(name, error):
             self.error, self.dead = None, isinstance(error, Killed)
             raise error
-        if error is None and self.impatient and name.endswith(".stop"):
+        if error is None and self.impatient and name.endswith("_stop"):
             self.impatient = False
             raise KeyboardInterrupt
 
@@ -116,7 +116,7 @@ class Tripwire:
         """Only the operator refuses; a device error during the safe stop does not end a scan."""
         if isinstance(error, OperatorStop):
             return name == "operator.ask"
-        made_safe = name.endswith(".stop") or name == "lamp.darken"
+        made_safe = name.endswith("_stop") or name == "lamp.darken"
         return not (isinstance(error, DeviceError) and made_safe)
 
 
@@ -227,7 +227,8 @@ class ScanMachine(RuleBasedStateMachine):
         calls = self.wire.calls
         begun = [n for n, c in enumerate(calls) if c.endswith((".start_move", ".home"))]
         last = begun[-1] if begun else -1
-        assert {f"{axis}.stop" for axis in ("theta_i", "dphi", "theta_r")} <= set(calls[last + 1 :])
+        axes, halves = ("theta_i", "dphi", "theta_r"), ("begin_stop", "finish_stop")
+        assert {f"{a}.{half}" for a in axes for half in halves} <= set(calls[last + 1 :])
         lamp = [c for c in calls if c in ("lamp.light", "lamp.darken")]
         assert lamp[-1] == "lamp.darken"
 

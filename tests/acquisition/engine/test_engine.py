@@ -115,7 +115,9 @@ def test_however_a_scan_ends_motion_is_stopped_and_the_lamp_darkened(
     )
     with pytest.raises(type(interrupt) if isinstance(interrupt, Exception) else interrupt):
         run(small, record, broken)
-    assert calls[-4:] == ["theta_i.stop", "dphi.stop", "theta_r.stop", "lamp.darken"]
+    axes = ("theta_i", "dphi", "theta_r")
+    stops = [f"{name}.{half}_stop" for half in ("begin", "finish") for name in axes]
+    assert calls[-7:] == [*stops, "lamp.darken"]
     assert record.readings()
 
 

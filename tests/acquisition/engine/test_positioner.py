@@ -20,7 +20,7 @@ from tests.support.whole_scans.stopped_scan import scan
 class Mute(PassThrough):
     """An axis that does not answer a stop."""
 
-    def stop(self) -> None:
+    def begin_stop(self) -> None:
         raise DeviceError("theta_i: no answer")
 
 
@@ -33,7 +33,7 @@ def test_an_axis_that_does_not_answer_keeps_no_other_from_being_stopped(
         "theta_r": Spy(devices.axes["theta_r"], calls, "theta_r"),
     }
     scan(small, record, changed_devices=lambda _: replace(devices, axes=axes))  # type: ignore[arg-type]  # stand-ins
-    assert calls[-1] == "theta_r.stop"
+    assert calls[-2:] == ["theta_r.begin_stop", "theta_r.finish_stop"]
 
 
 def test_a_ctrl_c_while_the_rig_is_made_safe_keeps_nothing_from_being_stopped(
@@ -48,11 +48,11 @@ def test_a_ctrl_c_while_the_rig_is_made_safe_keeps_nothing_from_being_stopped(
             super().__init__(devices.axes[name])
             self._name = name
 
-        def stop(self) -> None:
+        def begin_stop(self) -> None:
             calls.append(self._name)
             if calls == ["theta_i"]:
                 raise KeyboardInterrupt
-            devices.axes[self._name].stop()
+            devices.axes[self._name].begin_stop()
 
     axes = {name: Interrupted(name) for name in devices.axes}
     scan(small, record, changed_devices=lambda _: replace(devices, axes=axes))  # type: ignore[arg-type]  # stand-ins
@@ -74,7 +74,7 @@ def test_a_stage_that_kept_its_reference_is_not_homed_again(
     scan(small, record, None, same_bench)
     assert [r.step for r in record.readings()] == [r.step for r in whole]
     assert not [call for call in calls if call.endswith(".home")]
-    stops = [n for n, call in enumerate(calls) if call.endswith(".stop")]
+    stops = [n for n, call in enumerate(calls) if call.endswith(".finish_stop")]
     moves = [n for n, call in enumerate(calls) if call.endswith(".start_move")]
     assert max(stops[:3]) < min(moves)  # whatever still moved has been stopped first
 
@@ -163,5 +163,6 @@ def test_the_axis_that_moves_is_stopped_first(small: Loaded, record: Record) -> 
     axes = {name: Failing(axis, calls, name) for name, axis in devices.axes.items()}
     with pytest.raises(DeviceError, match="is gone"):
         scan(small, record, changed_devices=lambda _: replace(devices, axes=axes))  # type: ignore[arg-type]  # stand-ins
-    stops = [call for call in calls if call.endswith(".stop")]
-    assert stops == ["theta_r.stop", "theta_i.stop", "dphi.stop"]
+    stops = [call for call in calls if call.endswith("_stop")]
+    order = ["theta_r", "theta_i", "dphi"]
+    assert stops == [f"{name}.{half}_stop" for half in ("begin", "finish") for name in order]

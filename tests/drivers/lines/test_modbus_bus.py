@@ -12,7 +12,7 @@ import pytest
 
 from drivers.lines.modbus_bus import TRIES, ModbusBus, ModbusUnit
 from drivers.lines.modbus_client import BusSettings
-from drivers.lines.serial_line import REOPEN_S, NoReply, PortGone
+from drivers.lines.serial_line import REOPEN_S, PortGone
 from drivers.stages.motor_stage import Stopped
 from drivers.stages.oriental import OrientalStage
 from drivers.stages.oriental_framing import value_of
@@ -142,11 +142,7 @@ def test_fault_while_stopping(kind: str, fault: str) -> None:
         stage = az.homed()
         az.motor.move(-170.0)
         az.wire.inject(replace(FAULTS[fault], seconds=2 * FAULTS[fault].seconds))
-        if fault == "much later":  # than all three tries
-            with pytest.raises(NoReply, match="not acknowledged: it may still move"):
-                stage.stop()
-        else:
-            _outcome(fault, stage.stop, REOPEN_S + 1.0)
+        _outcome(fault, stage.stop, REOPEN_S + 1.0)
         assert not az.motor.moving
         if fault != "unplug":
             here = az.motor.position_deg

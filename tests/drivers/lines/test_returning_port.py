@@ -96,14 +96,18 @@ def test_a_numbered_name_is_opened_again_for_a_stop_only(
     numbered = Setup(setup.kind, tmp_path / "ttyUSB0")
     numbered.lose_port_in_a_move()
     numbered.clock.then = numbered.plug.put_in
-    numbered.stage.stop()
+    with pytest.raises(PortGone, match=r"told to stop .* not read to stand.* it may still move"):
+        numbered.stage.stop()
     wait_until(lambda: not numbered.motor.moving)
     moves = numbered.moves()
     for action in (numbered.stage.position_deg, numbered.stage.home):
         with pytest.raises(PortGone, match="name it by its link in /dev/serial/by-id"):
             action()
     assert numbered.moves() == moves
-    numbered.stage.stop()  # and a stop reaches it still
+    sent = len(numbered.plug.wire.seen)
+    with pytest.raises(PortGone, match="not read to stand"):
+        numbered.stage.stop()
+    assert len(numbered.plug.wire.seen) > sent  # and a stop reaches it still
     numbered.plug.pull_out()
 
 

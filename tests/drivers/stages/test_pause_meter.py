@@ -180,7 +180,7 @@ def test_the_watchdogs_stop_does_not_end_the_next_move(
 ) -> None:
     """A stop may have to wait for the line or for its port; nothing moves on before it is sent."""
     may_send, send = threading.Event(), setup.stage._send_stop
-    monkeypatch.setattr(setup.stage, "_send_stop", lambda: (may_send.wait(5), send()))
+    monkeypatch.setattr(setup.stage._stop, "_soft", lambda: (may_send.wait(5), send()))
     paused_under_way(setup)
     going_on = threading.Thread(target=setup.stage.start_move, args=(2.0,))
     going_on.start()

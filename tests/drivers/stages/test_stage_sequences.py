@@ -209,8 +209,8 @@ class StageMachine(RuleBasedStateMachine):
     @rule()
     def lose_reference(self) -> None:
         """The controller's power was off for a moment."""
-        self.motor.stop()
-        self.motor.referenced = self.known = False
+        self.motor.lose_power()
+        self.known = False
         self.disturbed = True
         self._stays()
 

@@ -70,7 +70,7 @@ def test_homing_is_watched_too() -> None:
 def test_the_watchdog_runs_only_during_a_motion() -> None:
     stops: list[float] = []
     watchdog = Watchdog(
-        "theta_r", lambda: False, lambda: stops.append(time.monotonic()), SystemClock()
+        "theta_r", lambda: None, lambda: stops.append(time.monotonic()), SystemClock()
     )
     watchdog.begin()
     watchdog.end()

@@ -52,6 +52,19 @@ def test_a_held_axis_never_arrives_and_a_stop_releases_it() -> None:
     assert motor.position_deg == pytest.approx(50.0)
 
 
+def test_a_stopped_axis_brakes_by_the_set_acceleration() -> None:
+    clock = SimulatedClock()
+    motor = homed(clock)
+    motor.move(-50.0)  # at -20 deg/s
+    clock.sleep(1.5)
+    motor.stop()
+    clock.sleep(0.49)
+    assert motor.moving
+    clock.sleep(0.02)
+    assert not motor.moving
+    assert motor.position_deg == pytest.approx(-25.0 - 20.0**2 / (2 * 40.0))
+
+
 def test_a_power_failure_stops_the_axis_and_loses_the_reference() -> None:
     clock = SimulatedClock()
     motor = homed(clock)

@@ -150,7 +150,7 @@ class MemoryStage:
 
     def open(self) -> MotorStage:
         stage = open_stage(self.kind, _ADDRESS[KINDS[self.kind].tcp], self.limits, self.clock)
-        stage.watchdog = NoWatchdog("none", lambda: True, lambda: None, self.clock)
+        stage.watchdog = NoWatchdog("none", lambda: "", lambda: None, self.clock)
         return stage
 
     def spoil_next(self, rng: random.Random, spoil: Spoil) -> None:
