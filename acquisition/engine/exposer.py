@@ -13,6 +13,7 @@ from acquisition.engine.exposure_check import ExposureCheck
 from acquisition.engine.exposure_search import ExposureSearch
 from acquisition.engine.retrying_camera import RetryingCamera
 from acquisition.interlocks.darks import REFERENCE_FRAMES, DarkCheck
+from acquisition.interlocks.outline import OutlineCheck
 from acquisition.measure.hot_pixels import hot_pixel_text
 from acquisition.measure.linearity import require_possible_times
 from acquisition.measure.radiometry import Dark, average_dark
@@ -73,11 +74,13 @@ class Exposer:
     _darks: dict[float, Dark] = field(default_factory=dict, init=False)
     _used_before: frozenset[float] = field(default=frozenset(), init=False)
     _last: dict[Surface, Reading] = field(default_factory=dict, init=False)
+    _outline: OutlineCheck = field(init=False)
 
     def __post_init__(self) -> None:
         target = self.protocol.exposure_target
         self._search = ExposureSearch(self.camera, self.rig.camera, target)
         self._dark_check = DarkCheck(self.rig)
+        self._outline = OutlineCheck.of(self.rig, self.protocol)
         self._check = ExposureCheck(self.rig.camera, self.clock, self.running_s, self.record)
 
     def restore(self, readings: Sequence[Reading]) -> None:
@@ -98,7 +101,7 @@ class Exposer:
         """Take all frames of a step, unsaturated if the camera's exposure range allows it."""
         guess_s = self._first_guess_s(step)
         tried = self._comparison(guess_s) + self._search.frames(guess_s, window)
-        first = tried.pop()
+        first = self._at_its_place(tried.pop(), step)
         frames, first_s = [first], self.scan_s()
         if step.frames > 1:
             frames += self.camera.grab(step.frames - 1)
@@ -108,6 +111,22 @@ class Exposer:
         dark = self._dark(first.exposure_s, window)
         self._check.require_proportional(tried, frames, self._darks, window)
         return Exposed(step, frames, dark, time_s=time_s, free_s=self.scan_s(), time_utc=utc)
+
+    def _at_its_place(self, first: Frame, step: Step) -> Frame:
+        """Return a first frame that shows the surface where the pose puts it, or a second one."""
+        text = self._outline.contradiction(first.image, step.surface, step.pose.theta_r)
+        if not text:
+            return first
+        second = self.camera.grab(1)[0]
+        still = self._outline.contradiction(second.image, step.surface, step.pose.theta_r)
+        if still:
+            raise Interlock(
+                f"{still}. Seen in two frames of step {step.index}. What was measured since it "
+                "happened is wrong too: gonio resume goes on if it has just happened, else start "
+                "a new run"
+            )
+        log.warning("%s. A second frame shows it at its place, and counts", text)
+        return second
 
     def scan_s(self) -> float:
         """Return the scan time: seconds since its start, without interruptions."""

@@ -24,11 +24,16 @@ SampleSize = Annotated[float, Field(gt=0, le=500)]
 
 
 class Sample(Section):
-    """Flat sample on the stage."""
+    """Flat sample on the stage.
+
+    `outline`: a thin rectangle, whose edges in the picture are compared with the pose of the rig;
+    none for a sample that is round, irregular or so thick that its sides show.
+    """
 
     name: Name
     width_mm: SampleSize
     height_mm: SampleSize
+    outline: Literal["rectangle", "none"] = "rectangle"
 
 
 MOST_ANGLES = 100_000
@@ -121,15 +126,24 @@ ViewAngle = Annotated[float, Field(ge=-89.5, le=89.5)]
 
 
 class WhiteTile(Section):
-    """Reference diffuser of known reflectance, measured at every position of the lamp."""
+    """Reference diffuser of known reflectance, measured at every position of the lamp.
+
+    `width_mm` and `height_mm` of a thin rectangular tile: its edges in the picture are compared
+    with the pose of the rig. Without them they are not.
+    """
 
     reflectance: Annotated[float, Field(gt=0, le=1)]
     u_reflectance: NotNegative
     theta_r_deg: ViewAngle = 0.0
     frames: Annotated[int, Field(ge=1, le=10_000)] = 16
+    width_mm: SampleSize | None = None
+    height_mm: SampleSize | None = None
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """Refuse an uncertainty of half the reflectance or more: it was probably given in %."""
+        """Require both sizes or none, and refuse half the reflectance as u: probably in %."""
+        if (self.width_mm is None) != (self.height_mm is None):
+            missing = "width_mm" if self.width_mm is None else "height_mm"
+            yield missing, "is missing; allowed: width_mm and height_mm, or neither"
         if self.u_reflectance >= self.reflectance / 2:
             yield (
                 "u_reflectance",

@@ -66,15 +66,22 @@ def own_mistakes(protocol: MarkedYaml, check_model: ModelCheck | None) -> Mistak
             # The models already limit the angles of the references.
             if path[0] == "sweeps" and _impossible(axis, value):
                 yield path, f"{value:g} deg; allowed: {low:g} to {high:g} deg from the normal"
-    for key in ("width_mm", "height_mm"):
-        window = _valid(_POSITIVE, protocol, "window", key)
-        sample = _valid(_POSITIVE, protocol, "sample", key)
-        if window is not None and sample is not None and window > sample:
-            text = f"{window:g} mm is larger than the sample; allowed: at most {sample:g} mm"
-            yield ("window", key), text
+    yield from _window_past_surfaces(protocol)
     yield from _repeated(protocol)
     if check_model is not None:
         yield from _model_mistakes(protocol, check_model)
+
+
+def _window_past_surfaces(protocol: MarkedYaml) -> Mistakes:
+    surfaces: dict[str, KeyPath] = {
+        "sample": ("sample",), "white tile": ("references", "white_tile"),
+    }  # fmt: skip
+    for key, (name, path) in product(("width_mm", "height_mm"), surfaces.items()):
+        window = _valid(_POSITIVE, protocol, "window", key)
+        size = _valid(_POSITIVE, protocol, *path, key)
+        if window is not None and size is not None and window > size:
+            text = f"{window:g} mm is larger than the {name}; allowed: at most {size:g} mm"
+            yield ("window", key), text
 
 
 def _valid(kind: TypeAdapter[Any], marked: MarkedYaml, *path: str | int) -> Any:

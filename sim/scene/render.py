@@ -53,11 +53,11 @@ def electrons_per_s(scene: Scene) -> FloatImage:
 
 
 def _project(scene: Scene) -> _Projection:
-    pinhole, size = Pinhole.of(scene.rig), scene.size
+    pinhole = Pinhole.of(scene.rig)
     height_mm = 0.0 if scene.mounted is None else scene.heights_mm[scene.mounted]
     homography = pinhole.homography(scene.seen_deg()["theta_r"], height_mm)
     homography = homography @ scene.world.placement()
-    corners = apply_homography(homography, rectangle_mm(size.width_mm, size.height_mm))
+    corners = apply_homography(homography, rectangle_mm(*scene.size_mm))
     return _Projection(homography, polygon_coverage(corners, pinhole.width_px, pinhole.height_px))
 
 

@@ -39,7 +39,7 @@ def stream_key(name: str) -> int:
 class Scene:
     """Mounted surface, lamp and axes at one moment of a scan.
 
-    sample: reflectance of the sample. size: its extent. patch: the part of it that is measured.
+    sample: reflectance of the sample. sample_size: its extent. patch: its part that is measured.
     true_deg: true angle of each axis in degrees; it differs from the commanded one by the axis
     error. clock: by which the lamp drifts. rings: see `sim.scene.render`; cache of the averaging
     needed for each place of the lamp. heights_mm: height of each surface above the rotation axis;
@@ -49,7 +49,7 @@ class Scene:
 
     rig: Rig
     sample: SimulatedSample
-    size: Sample
+    sample_size: Sample
     patch: PatchConfig
     white_tile: WhiteTile | None
     surface: Surface = "sample"
@@ -145,6 +145,14 @@ class Scene:
         albedo = self.tile_reflectance()
         return lambda geometry: MODELS["lambert"].brdf(geometry, albedo=albedo)
 
+    @property
+    def size_mm(self) -> tuple[float, float]:
+        """Width and height of the mounted surface; a tile of unstated size is like the sample."""
+        tile = self.white_tile if self.mounted == "white tile" else None
+        if tile is None or tile.width_mm is None or tile.height_mm is None:
+            return self.sample_size.width_mm, self.sample_size.height_mm
+        return tile.width_mm, tile.height_mm
+
     def tile_reflectance(self) -> float:
         """Return the white tile's true reflectance: the certified one plus a random error."""
         tile = self.white_tile
@@ -163,7 +171,7 @@ class Scene:
 
         The spacing of the grid points is in mm.
         """
-        size = self.size
+        size = self.sample_size
         spacing_mm = self.sample.mottling_size_mm / 3.0
         rows = int(np.ceil(size.height_mm / spacing_mm)) + 1
         columns = int(np.ceil(size.width_mm / spacing_mm)) + 1

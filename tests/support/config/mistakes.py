@@ -126,7 +126,7 @@ PROTOCOL_MISTAKES = {
         "u_reflectance: 0.005",
         "u_reflectence: 0.005",
         "12:35: references.white_tile.u_reflectence: unknown key; did you mean u_reflectance?"
-        " allowed: reflectance, u_reflectance, theta_r_deg, frames",
+        " allowed: reflectance, u_reflectance, theta_r_deg, frames, width_mm, height_mm",
     ),
     "double key": (
         "exposure_target: 0.7",

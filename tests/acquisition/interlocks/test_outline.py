@@ -1,0 +1,192 @@
+"""Outline: no alarm within the uncertainties; slips, moved surfaces and wrong sizes are told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.interlocks.outline import CHI2_LIMITS, LIMIT_SIGMA, Deviation, OutlineCheck
+from instrument.config.load import Loaded, load_protocol
+from instrument.config.protocol import References, WhiteTile
+from instrument.devices import Image
+from instrument.errors import Interlock
+from instrument.geometry import FloatArray
+from instrument.pinhole import Pinhole
+from instrument.record.record import Record
+from sim.scene.scene import Scene
+from sim.scene.sensor import Sensor
+from tests.support.paths import CONFIGS
+from tests.support.random_pictures import Picture, random_picture
+from tests.support.scans import changed, small_scan
+from tests.support.whole_scans.stopped_scan import scan
+
+RIGS = {"bench_12bit": 0.005, "paper_1995": 0.01, "emulated": 0.0002}  # with an exposure in s
+
+
+def _demo(rig: str) -> Loaded:
+    return load_protocol(CONFIGS / "protocols" / "demo.yaml", CONFIGS / "rigs" / f"{rig}.yaml")
+
+
+def _scene(loaded: Loaded, theta_r_deg: float) -> Scene:
+    scene = Scene.of(loaded.rig, loaded.protocol)
+    for axis, angle in (("theta_i", 45.0), ("dphi", 0.0), ("theta_r", theta_r_deg)):
+        scene.set_axis(axis, angle)
+    return scene
+
+
+def _told(rig: str, said_deg: float, true_deg: float) -> str:
+    """What is said of a picture at one angle where the stage reports another."""
+    loaded = _demo(rig)
+    picture = Sensor(_scene(loaded, true_deg)).picture(RIGS[rig])
+    return OutlineCheck.of(loaded.rig, loaded.protocol).contradiction(picture, "sample", said_deg)
+
+
+def test_random_pictures_without_a_fault_raise_no_alarm(slow: bool) -> None:
+    """Rigs, samples, textures, poses, exposures; true values off by what u says of them."""
+    pictures = [random_picture(seed) for seed in range(4000 if slow else 100)]
+    told = [p.check.contradiction(p.take(), "sample", p.theta_r_deg) for p in pictures]
+    assert not [text for text in told if text]
+
+
+def test_most_pictures_of_a_bright_sample_show_their_edges() -> None:
+    """Otherwise silence would be no proof."""
+    compared = [p.check.compare(p.take(), "sample", p.theta_r_deg)
+                for p in map(_bright, range(60)) if abs(p.theta_r_deg) < 70]  # fmt: skip
+    inside = [c for c in compared if _is_inside(c.outline.corners_px(), c.outline.pinhole)]
+    assert len(inside) > 15
+    assert [len(c.edges) for c in inside] == [4] * len(inside)
+
+
+def _is_inside(corners: FloatArray, pinhole: Pinhole) -> bool:
+    size = np.array([pinhole.width_px, pinhole.height_px])
+    across = np.linalg.norm(corners[0] - corners[[1, 3]], axis=1)
+    return bool(np.all((corners > 25) & (corners < size - 25)) and np.all(across > 50))
+
+
+def _bright(seed: int) -> Picture:
+    """A random picture whose sample is brighter than the table, and exposed well."""
+    picture = random_picture(seed)
+    rig = picture.scene.rig
+    simulation = rig.simulation.model_copy(update={"background_reflectance": 0.02})
+    picture.scene.rig = rig.model_copy(update={"simulation": simulation})
+    picture.scene.sample = picture.scene.sample.model_copy(
+        update={"model": "lambert", "parameters": {"albedo": 0.8}, "mottling": 0.02}
+    )
+    picture.scene.true_deg["theta_i"] = 30.0
+    full = rig.camera.full_well_electrons
+    return replace(picture, exposure_s=0.7 * full / rig.lamp.white_electrons_per_s)
+
+
+@pytest.mark.parametrize("said_deg", [-80.0, -60.0, -45.0, -20.0, 0.0, 30.0, 45.0, 60.0, 75.0])
+def test_a_slip_of_5_degrees_is_seen_all_over_the_sweep(said_deg: float) -> None:
+    for slip_deg in (-5.0, 5.0):
+        text = _told("bench_12bit", said_deg, said_deg + slip_deg)
+        assert f"is not where theta_r {said_deg:g} deg puts it in the picture" in text
+        seen = float(text.split("that of theta_r ")[1].split()[0])
+        assert seen == pytest.approx(said_deg + slip_deg, abs=0.4)
+
+
+@pytest.mark.parametrize("said_deg", [-75.0, -60.0, 60.0, 75.0])
+@pytest.mark.parametrize("rig", ["paper_1995", "emulated"])
+def test_a_slip_is_seen_at_oblique_angles_on_the_other_rigs(rig: str, said_deg: float) -> None:
+    assert "The picture is that of theta_r" in _told(rig, said_deg, said_deg - 5.0)
+    assert "The picture is that of theta_r" in _told(rig, said_deg, said_deg + 5.0)
+
+
+@pytest.mark.parametrize("rig", RIGS)
+@pytest.mark.parametrize("angle_deg", [-75.0, -30.0, 0.0, 10.0, 60.0])
+def test_no_slip_no_word(rig: str, angle_deg: float) -> None:
+    assert _told(rig, angle_deg, angle_deg) == ""
+
+
+def test_a_shifted_sample_is_told_as_such() -> None:
+    loaded = _demo("bench_12bit")
+    scene = _scene(loaded, 20.0)
+    moved = loaded.rig.camera.model_copy(update={"axis_column_px": 317.0 + 90})
+    scene.rig = loaded.rig.model_copy(update={"camera": moved})
+    check = OutlineCheck.of(loaded.rig, loaded.protocol)
+    text = check.contradiction(Sensor(scene).picture(0.005), "sample", 20.0)
+    assert "off its place" in text
+    assert float(text.split("A surface ")[1].split()[0]) == pytest.approx(10.8, abs=0.5)
+
+
+def _with_tile(loaded: Loaded, width_mm: float, height_mm: float) -> Loaded:
+    tile = WhiteTile(reflectance=0.99, u_reflectance=0.005, theta_r_deg=10.0, frames=4,
+                     width_mm=width_mm, height_mm=height_mm)  # fmt: skip
+    drift = loaded.protocol.references.drift_check
+    return changed(loaded, references=References(white_tile=tile, drift_check=drift))
+
+
+def test_a_tile_left_on_the_table_is_told_by_its_size() -> None:
+    loaded = _with_tile(_demo("bench_12bit"), 40.0, 45.0)
+    scene = _scene(loaded, 35.0)
+    scene.surface = "white tile"
+    check = OutlineCheck.of(loaded.rig, loaded.protocol)
+    picture = Sensor(scene).picture(0.002)
+    assert check.contradiction(picture, "white tile", 35.0) == ""
+    text = check.contradiction(picture, "sample", 35.0)
+    assert "The white tile (40 x 45 mm) would look like this: is it still on the table?" in text
+
+
+def test_a_wrong_size_is_told_with_the_size_that_is_seen() -> None:
+    loaded = _demo("bench_12bit")
+    scene = _scene(loaded, -10.0)
+    scene.sample_size = scene.sample_size.model_copy(update={"height_mm": 35.0})
+    check = OutlineCheck.of(loaded.rig, loaded.protocol)
+    text = check.contradiction(Sensor(scene).picture(0.005), "sample", -10.0)
+    seen_mm = [float(word) for word in text.split("A surface of ")[1].split()[:3:2]]
+    assert seen_mm == pytest.approx([50.8, 35.0], abs=0.2)
+    assert "would look like this: look what lies on the table" in text
+
+
+def test_a_round_sample_is_told_how_to_go_on_and_can_be_left_out() -> None:
+    loaded = _demo("bench_12bit")
+    rows, columns = np.mgrid[:512, :640]
+    disc = np.hypot(rows - 257.5, columns - 317) < 225
+    picture: Image = (70 + 2000 * disc).astype(np.uint16)
+    check = OutlineCheck.of(loaded.rig, loaded.protocol)
+    sample = loaded.protocol.sample.model_copy(update={"outline": "none"})
+    unchecked = OutlineCheck.of(loaded.rig, changed(loaded, sample=sample).protocol)
+    assert unchecked.contradiction(picture, "sample", 0.0) == ""
+    text = check.contradiction(picture, "sample", 0.0)
+    assert text == "" or "outline: none" in text
+
+
+def test_the_limits_are_as_rare_as_six_standard_deviations() -> None:
+    from scipy.stats import chi2, norm
+
+    for values, limit in CHI2_LIMITS.items():
+        assert limit == pytest.approx(chi2.isf(2 * norm.sf(LIMIT_SIGMA), values), abs=0.005)
+
+
+def test_a_slip_in_mid_scan_ends_it_and_names_the_step(
+    record: Record, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the 13th setting of the view angle on, the stage is 5 degrees further than it says."""
+    true, count = Scene.set_axis, [0]
+
+    def slipped(scene: Scene, axis: str, angle_deg: float) -> None:
+        count[0] += axis == "theta_r"
+        true(scene, axis, angle_deg + 5.0 * (axis == "theta_r" and count[0] > 12))
+
+    monkeypatch.setattr(Scene, "set_axis", slipped)
+    with pytest.raises(Interlock, match=r"theta_r [-\d.]+ deg puts it .* two frames of step \d+"):
+        scan(small_scan(shrink=2), record)
+    assert record.readings()
+
+
+def test_one_picture_with_a_hand_in_it_is_noted_and_the_next_counts(
+    record: Record, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    answers = iter(["", "", "a hand", "", *[""] * 100])
+    monkeypatch.setattr(OutlineCheck, "contradiction", lambda *_: next(answers))
+    scan(small_scan(), record)
+    told = [r.getMessage() for r in caplog.records if r.name == "acquisition.interlocks"]
+    assert told == ["a hand. A second frame shows it at its place, and counts"]
+
+
+def test_a_deviation_keeps_the_order_of_its_fields() -> None:
+    values = np.arange(10.0)
+    assert Deviation.of(values).values.tolist() == values.tolist()
