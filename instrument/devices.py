@@ -20,6 +20,8 @@ Controllers answer within 10 to 50 ms. A stop waits no longer than this, and a l
 for again before the status of a moving stage is too old.
 """
 Surface = Literal["sample", "white tile"]
+CHANGING_SETTINGS = frozenset({"exposure", "frame period"})
+"""Settings of a camera that differ during a scan, or are measured anew when it is opened."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +29,14 @@ class Frame:
     """One image: `image[row, column]` in counts (DN), its exposure and time of read-out.
 
     `device_time_s`: the camera's own time stamp in seconds of the monotonic clock, None if none.
+    `sequence`: number of the frame by the camera's driver, None if it does not count.
     """
 
     image: Image
     exposure_s: float
     time_s: float
     device_time_s: float | None = None
+    sequence: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,8 @@ from acquisition.terminal.progress import scan_progress
 from acquisition.terminal.stop_thread import stopped_by_signals
 from instrument.clock import Clock, SystemClock
 from instrument.config.load import Loaded
-from instrument.errors import DeviceError, OperatorStop, StorageError, WrongRigFile
-from instrument.record.event_kinds import FAULT, FINISHED, STOPPED
+from instrument.errors import DeviceError, Interlock, OperatorStop, StorageError, WrongRigFile
+from instrument.record.event_kinds import FAULT, FINISHED, INTERLOCK, STOPPED
 from instrument.record.record import Record
 
 # Loggers of what a person can help with: a record or a camera that is waited for, an exposure, an
@@ -47,7 +47,8 @@ def scan(loaded: Loaded, plan: Plan, record: Record, progress: Progress | None =
             ended = "" if log.troubles else ": all motion has ended."
             raise OperatorStop(f"{why}{ended} {_how_to_go_on(record, log)}") from None
         except (DeviceError, StorageError) as error:
-            _record_end(record, log, clock, FAULT, str(error))
+            kind = INTERLOCK if isinstance(error, Interlock) else FAULT
+            _record_end(record, log, clock, kind, str(error))
             rest = _how_to_go_on(record, log, resume=not isinstance(error, WrongRigFile))
             raise type(error)(f"{error}\n{rest}") from error
         except Exception as error:

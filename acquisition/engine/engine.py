@@ -19,6 +19,8 @@ from acquisition.engine.positioner import Positioner
 from acquisition.engine.preview import make_preview
 from acquisition.engine.resume import Progress, check_text, report_found
 from acquisition.engine.retrying_camera import RetryingCamera
+from acquisition.interlocks.frame_scatter import FrameScatter
+from acquisition.interlocks.watched_camera import WatchedCamera
 from acquisition.measure.placement import Placement
 from acquisition.measure.radiometry import Signal, measure
 from acquisition.measure.window import Window, window_at
@@ -31,7 +33,7 @@ from instrument.config.rig import Rig
 from instrument.devices import Camera, Lamp, Operator, Surface
 from instrument.errors import DeviceError
 from instrument.pinhole import Pinhole
-from instrument.record.event_kinds import DRIFT, OPERATOR
+from instrument.record.event_kinds import DRIFT, INTERLOCK, OPERATOR
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 
@@ -70,9 +72,11 @@ class Engine:
         self._ended = False
         note = partial(self._add_event, OPERATOR)
         self._positioner = Positioner(rig, devices.axes, devices.lamp, devices.operator, note)
+        self._scatter = FrameScatter(rig, partial(self._add_event, INTERLOCK))
         self._begun_step = (0, 0.0, 0.0)  # its index, and its begin in scan time and running time
         wait_s, clock = rig.camera.reconnect_s, devices.clock
-        camera = RetryingCamera(devices.camera, clock, wait_s, self._continue_step)
+        self._camera = WatchedCamera(devices.camera, rig.camera)
+        camera = RetryingCamera(self._camera, clock, wait_s, self._continue_step)
         self._exposer = Exposer(
             camera, devices.lamp, clock, protocol, rig, record, self._continue_step
         )
@@ -103,8 +107,10 @@ class Engine:
         named: dict[str, Camera | Axis] = {"camera": devices.camera, **devices.axes}
         for role, device in named.items():
             self._register(role, device.identity())
-            self._record.add_settings(devices.clock.utc().isoformat(), role, device.settings())
         self._register("lamp", devices.lamp.identity())
+        self._camera.expect(self._record.settings().get("camera", {}))
+        for role, device in named.items():
+            self._record.add_settings(devices.clock.utc().isoformat(), role, device.settings())
 
     def _register(self, role: str, identity: str) -> None:
         """Record a device's identity; a resumed scan requires the one of its beginning."""
@@ -237,6 +243,9 @@ class Engine:
         rig, theta_i_deg = self._rig, exposed.step.pose.theta_i
         placement = Placement(rig.u_placement_mm, theta_i_deg, rig.lamp_distance_mm)
         signal = measure(exposed.frames, exposed.dark, window, rig.camera, placement, least)
+        signal = self._scatter.judged(
+            signal, exposed.frames, exposed.dark, window, f"step {exposed.step.index}"
+        )
         return _reading(exposed, signal)
 
     def _add_event(self, kind: str, text: str) -> None:

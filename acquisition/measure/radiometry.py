@@ -133,7 +133,7 @@ def _mean_and_variance(
         squares += np.square(counts, out=counts)
     mean = total / count
     if count == 1:
-        return mean, _photon_transfer(mean, camera)
+        return mean, photon_transfer(mean, camera)
     return mean, (squares - total * mean) / (count - 1)
 
 
@@ -147,11 +147,14 @@ def _u_rounding(level_dn: float, camera: CameraConfig) -> float:
 
     The dithering noise is taken from the rig file: the measured noise contains the rounding.
     """
-    return rounding_u_dn(float(_photon_transfer(np.asarray(level_dn), camera)))
+    return rounding_u_dn(float(photon_transfer(np.asarray(level_dn), camera)))
 
 
-def _photon_transfer(mean: FloatArray, camera: CameraConfig) -> FloatArray:
-    """Return the variance of a pixel before rounding, in DN^2: photon and read noise."""
+def photon_transfer(mean: FloatArray, camera: CameraConfig) -> FloatArray:
+    """Return the variance of a pixel before rounding, in DN^2: photon and read noise.
+
+    `mean`: counts of any shape in DN, which the result has too.
+    """
     gain = camera.electrons_per_dn
     electrons = np.maximum(mean - camera.black_level_dn, 0.0) * gain
     variance: FloatArray = (electrons + camera.read_noise_electrons**2) / gain**2

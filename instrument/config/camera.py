@@ -19,6 +19,8 @@ class CameraConfig(Section):
     """Camera on the beam: image, field of view, sensor and exposure.
 
     `reconnect_s`: time for which a scan waits for a camera whose connection was lost.
+    `u_black_level_dn`: standard deviation of the black level from frame to frame; the default is
+    that of a clamp which regulates to a fraction of a count.
     """
 
     width_px: Annotated[int, Field(ge=16, le=16384)]
@@ -32,6 +34,7 @@ class CameraConfig(Section):
     read_noise_electrons: NotNegative
     dark_current_electrons_per_s: NotNegative
     black_level_dn: NotNegative = 0.0
+    u_black_level_dn: NotNegative = 0.25
     min_exposure_s: Positive
     max_exposure_s: Positive
     frame_overhead_s: NotNegative

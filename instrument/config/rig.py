@@ -48,7 +48,8 @@ class LampConfig(Section):
 
     A `manual` lamp is a real one without a driver. `white_electrons_per_s`: electrons that a pixel
     collects from a perfect white diffuser at normal incidence; it predicts the first exposure and
-    the duration of a scan.
+    the duration of a scan. `u_flicker`: relative standard deviation of the light from frame to
+    frame. The default suits a lamp on a stabilised supply of direct current.
     """
 
     driver: Literal["simulated", "manual"]
@@ -56,6 +57,7 @@ class LampConfig(Section):
     shutter_s: NotNegative = 0.1
     cover_s: NotNegative = 15.0
     white_electrons_per_s: Positive
+    u_flicker: Annotated[float, Field(ge=0, lt=1)] = 0.003
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
         """Refuse a shutter on a manual lamp: no driver would operate it."""

@@ -24,9 +24,10 @@ class SimulatedCamera:
         return f"simulated camera, {s.width_px} x {s.height_px} pixels, {s.bit_depth} bit"
 
     def settings(self) -> dict[str, str]:
-        """Return size in pixels and bit depth."""
+        """Return size in pixels, bit depth, and the present gain in %."""
         s = self._settings
-        return {"size_px": f"{s.width_px} x {s.height_px}", "bit_depth": str(s.bit_depth)}
+        size = {"size_px": f"{s.width_px} x {s.height_px}", "bit_depth": str(s.bit_depth)}
+        return {**size, "gain": f"{100 * self._scene.world.gain:g}"}
 
     def set_exposure_s(self, exposure_s: float) -> float:
         """Set the exposure in seconds; raise `DeviceError` outside the camera's range."""

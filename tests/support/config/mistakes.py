@@ -395,6 +395,6 @@ RIG_MISTAKES = {
         "lamp: {driver: simulated, darkened_by: shutter, white_electrons_per_s: 600000.0}",
         "lamp: [1]",
         "34:7: lamp: a list is given; allowed: a block with driver, darkened_by, shutter_s,"
-        " cover_s, white_electrons_per_s",
+        " cover_s, white_electrons_per_s, u_flicker",
     ),
 }

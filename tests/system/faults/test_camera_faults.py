@@ -126,10 +126,15 @@ class SceneRenderer:
         return replace(self.scene, true_deg=dict(self.scene.true_deg))
 
     def render(self, exposure: Exposure, snapshot: object) -> NDArray[Any]:
-        """Use a new sensor for each image: its noise must not depend on dropped frames."""
+        """Use a new sensor for each image: its noise must not depend on dropped frames.
+
+        The first row, outside the window, is the frame's number: no two frames are equal.
+        """
         if not isinstance(snapshot, Scene) or len(snapshot.true_deg) < 3:
             return np.zeros((exposure.height_px, exposure.width_px), np.uint16)  # not homed yet
-        return Sensor(snapshot).picture(exposure.exposure_s)
+        image = Sensor(snapshot).picture(exposure.exposure_s)
+        image[0] = exposure.sequence % 4096
+        return image
 
 
 @contextmanager

@@ -1,0 +1,193 @@
+"""Scatter of the window's mean from frame to frame, beyond what photons and read-out explain.
+
+Only pixel noise, flicker of the lamp and the camera's black level make frames of one step differ.
+With frame means m_k of variance v the sum of (m_k - mean)^2 / v has a chi-squared distribution of
+n - 1 degrees of freedom; v is the larger of the rig file's photon transfer and the variance that
+the pixels show (the true gain may differ from the full well of the rig file). What exceeds it
+raises the reading's noise, up to what the rig file states for flicker and black level; what exceeds
+that too is flagged, and ends the scan where reading after reading has it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from acquisition.measure.hot_pixels import without_hot_pixels
+from acquisition.measure.radiometry import Dark, Signal, photon_transfer
+from acquisition.measure.window import Window
+from instrument.config.rig import Rig
+from instrument.devices import Frame
+from instrument.errors import Interlock
+from instrument.geometry import FloatArray
+
+FLAG = "frames differ"
+# Limits of chi-squared, as deviations of a normal distribution. A scatter is seen in one of 30 000
+# sound readings, whose u it raises; it is surely too large in none of 50 million.
+_SEEN_SIGMA, _SURE_SIGMA = 4.0, 5.5
+_LOW_TAIL = 0.05  # probability that so small a scatter is seen by chance
+_RECENT = 8  # readings
+# Variance of a pixel relative to the rig file's: 16 of read noise where the true full well is a
+# quarter. More is no noise, but a frame that differs.
+_MOST_NOISE = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Scatter:
+    """Scatter of frame means in one reading, all in DN or DN^2.
+
+    deviations_dn (frames,): of each frame's mean from the mean of all. pixel_variance: of one
+    frame's mean by pixel noise. allowed_variance: by flicker and black level.
+    """
+
+    deviations_dn: FloatArray
+    pixel_variance: float
+    allowed_variance: float
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom."""
+        return self.deviations_dn.size - 1
+
+    @property
+    def squares(self) -> float:
+        """Sum of the squared deviations."""
+        return float(self.deviations_dn @ self.deviations_dn)
+
+    @property
+    def noise_ratio(self) -> float:
+        """Sum of squares relative to the variance by pixel noise: chi-squared."""
+        return self.squares / self.pixel_variance
+
+    @property
+    def ratio(self) -> float:
+        """Sum of squares relative to the variance that noise and rig file allow: chi-squared."""
+        return self.squares / (self.pixel_variance + self.allowed_variance)
+
+
+def frame_scatter(
+    frames: Sequence[Frame], signal: Signal, dark: Dark, window: Window, rig: Rig
+) -> Scatter:
+    """Return the scatter of the window's mean over two frames or more."""
+    window, _ = without_hot_pixels(window, dark.hot)
+    total, squares = float(window.weights.sum()), float(np.vdot(window.weights, window.weights))
+    level_dn = rig.camera.black_level_dn + max(signal.signal_dn, 0.0) / total
+    predicted = squares * float(photon_transfer(np.asarray(level_dn), rig.camera))
+    shown = min(len(frames) * signal.u_noise_dn**2, _MOST_NOISE * predicted)
+    flicker_dn = rig.lamp.u_flicker * signal.signal_dn
+    black_dn = rig.camera.u_black_level_dn * total
+    return Scatter(
+        _deviations_dn(frames, window), max(predicted, shown, 1e-12), flicker_dn**2 + black_dn**2
+    )
+
+
+def _deviations_dn(frames: Sequence[Frame], window: Window) -> FloatArray:
+    """Return the deviation of each frame's window mean from the mean of all, (frames,) in DN."""
+    import cv2
+
+    first = frames[0].image[window.crop]
+    weights = window.weights.astype(np.float32)
+    means = [0.0]
+    for frame in frames[1:]:
+        change = cv2.subtract(frame.image[window.crop], first, dtype=cv2.CV_32F)
+        means.append(float(np.vdot(weights, change)))
+    deviations: FloatArray = np.array(means) - np.mean(means)
+    return deviations
+
+
+def _limit(freedom: int, sigma: float) -> float:
+    """Return the value that chi-squared exceeds as seldom as a normal deviate `sigma`.
+
+    Wilson and Hilferty 1931: the cube root of chi-squared is nearly normal; at one degree of
+    freedom the limit is a fifth too large.
+    """
+    part = 2 / (9 * freedom)
+    return float(freedom * (1 - part + sigma * math.sqrt(part)) ** 3)
+
+
+@dataclass(slots=True)
+class FrameScatter:
+    """Judge of the readings of one scan; `note` records what was found.
+
+    A single bad frame spoils one reading. Where the last readings without the worst of them
+    scatter too much all together, the lamp or the camera is unsteady.
+    """
+
+    rig: Rig
+    note: Callable[[str], None]
+    _recent: deque[Scatter] = field(default_factory=lambda: deque(maxlen=_RECENT))
+
+    def judged(
+        self, signal: Signal, frames: Sequence[Frame], dark: Dark, window: Window, name: str
+    ) -> Signal:
+        """Return the signal with the scatter in its noise, or flagged; `name` is its reading's.
+
+        Raises `Interlock` where it is not the first such reading.
+        """
+        if len(frames) < 2 or not signal.window_pixels > 0:
+            return signal
+        found = frame_scatter(frames, signal, dark, window, self.rig)
+        self._recent.append(found)
+        excess = self._excess_variance(found) / len(frames)
+        if excess > 0:
+            signal = replace(signal, u_noise_dn=math.hypot(signal.u_noise_dn, math.sqrt(excess)))
+        flags = [signal.flags] * bool(signal.flags)
+        if found.ratio > _limit(found.freedom, _SURE_SIGMA):
+            self.note(f"{name}: {FLAG}: {self._text(found, signal)}")
+            flags.append(FLAG)
+        self._require_steady(signal, name)
+        return replace(signal, flags="; ".join(flags))
+
+    def _without_worst(self) -> list[Scatter]:
+        """Return the last readings, the worst left out if there are others."""
+        order = sorted(self._recent, key=lambda one: one.ratio / one.freedom)
+        return order[:-1] or order
+
+    def _excess_variance(self, found: Scatter) -> float:
+        """Return the variance of one frame's mean beyond pixel noise, 0 if none is seen.
+
+        The last readings give its 95 % bound, as two frames alone may agree by chance; it counts up
+        to what the rig file allows.
+        """
+        from scipy.special import chdtri
+
+        last = self._without_worst()
+        freedom = sum(one.freedom for one in last)
+        own = found.noise_ratio > _limit(found.freedom, _SEEN_SIGMA)
+        all_of_them = sum(one.noise_ratio for one in last) > _limit(freedom, _SEEN_SIGMA)
+        if not (own or all_of_them):
+            return 0.0
+        measured = found.squares / found.freedom - found.pixel_variance if own else 0.0
+        shares = sum(one.squares / max(one.allowed_variance, 1e-12) for one in last)
+        bound = min(shares / float(chdtri(freedom, 1 - _LOW_TAIL)), 1.0) * found.allowed_variance
+        return max(measured, bound)
+
+    def _require_steady(self, signal: Signal, name: str) -> None:
+        """Raise `Interlock` if the last readings scatter too much, the worst left out."""
+        last = self._without_worst()
+        freedom = sum(one.freedom for one in last)
+        if len(self._recent) < 2 or sum(one.ratio for one in last) <= _limit(freedom, _SURE_SIGMA):
+            return
+        raise Interlock(
+            f"{FLAG}, in reading after reading, lastly in {name}: "
+            f"{self._text(self._recent[-1], signal)}: look at the lamp's supply, at daylight and "
+            "at the camera's cable; expose over whole periods of the mains; a lamp that flickers "
+            "so much by nature needs a larger u_flicker in the rig file, and a new run"
+        )
+
+    def _text(self, found: Scatter, signal: Signal) -> str:
+        worst = int(np.argmax(np.abs(found.deviations_dn)))
+        rms = math.sqrt(found.squares / found.freedom)
+        return (
+            f"the window's mean scatters by {rms:.3g} DN of {signal.signal_dn:.4g} DN from frame "
+            f"to frame, most in frame {worst + 1} of {found.deviations_dn.size} "
+            f"({found.deviations_dn[worst]:+.3g} DN); noise explains "
+            f"{math.sqrt(found.pixel_variance):.2g} DN, the rig file allows "
+            f"{math.sqrt(found.allowed_variance):.2g} DN (lamp: u_flicker "
+            f"{self.rig.lamp.u_flicker:g}, camera: u_black_level_dn "
+            f"{self.rig.camera.u_black_level_dn:g})"
+        )
