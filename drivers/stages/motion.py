@@ -142,6 +142,7 @@ class MoveMonitor(Monitor):
 
     def _shows_motion(self, now: Status, time_s: float) -> bool:
         if now.moving:
+            self._at_s = self._at_s if self.begun else time_s
             self._moved_s = time_s - self._started_s
         return now.moving or abs(now.position_deg - self._start) > self._step_deg
 

@@ -65,6 +65,11 @@ class OrientalStage(MotorStage):
             fault=output.fault,
         )
 
+    def _send_harder_stop(self) -> None:
+        """Send STOP as a new edge; FREE would only let go of a beam, which may then fall."""
+        self._drive.write_at_once(framing.INPUT_WORD, 0)
+        self._send_stop()
+
     def _status_after_stop(self) -> Status:
         """Read the status, with the time to get in step again after a lost answer."""
         return self._status(self._clock.now_s() + 2 * self._reply_s)

@@ -19,6 +19,7 @@ log = logging.getLogger(__name__)
 STANDS_S = 0.05  # between two answers that report rest
 CHECK_S = 0.1  # between two measurements of the speed
 HARDER_AFTER_S = 0.5  # beyond the braking time: then the controller's harder stop, if it has one
+REPORT_EVERY_S = 1.0
 _BRAKING = 0.5  # share of the set deceleration at which a stage counts as braking
 _ANSWERS = 6  # on a slow line: time allowed, in answers
 _POLL_S = 0.005
@@ -103,11 +104,12 @@ class VerifiedStop:
         self._times = 0
         self._unsent: DeviceError | None = None
         self._unread: DeviceError | None = None
+        self._reported_s: float | None = None
 
     def begin(self) -> None:
         """Send the stop at once; a stop that cannot be sent is sent again by `finish`."""
         self._begun_s, self._sent_s = self._clock.now_s(), None
-        self._times, self._unread = 0, None
+        self._times, self._unread, self._reported_s = 0, None, None
         self._send(self._soft)
 
     def finish(self, rest_from_s: float) -> None:
@@ -122,7 +124,7 @@ class VerifiedStop:
                 return
             if time_s > self._until_s():
                 raise self._unconfirmed(now)
-            if monitor.should_resend(now, time_s):
+            if monitor.should_resend(now, time_s) and self._unsent is None:
                 self._repeat(now, time_s)
             gone = isinstance(self._unsent or self._unread, PortGone)
             self._clock.sleep(REOPEN_EVERY_S if gone else _POLL_S)
@@ -150,14 +152,18 @@ class VerifiedStop:
         return now
 
     def _repeat(self, now: Status | None, time_s: float) -> None:
-        since_s = time_s - self._begun_s
-        seen = f"no status ({self._unread})" if now is None else f"at {now.position_deg:g} deg"
-        log.warning(
-            "%s: not at rest %.2f s after a stop, %s: sent again", self._name, since_s, seen
-        )
+        self._report(now, time_s)
         sent_s = time_s if self._sent_s is None else self._sent_s
         harder = time_s - sent_s > self._brakes_s + HARDER_AFTER_S
         self._send(self._harder if harder else self._soft)
+
+    def _report(self, now: Status | None, time_s: float) -> None:
+        """Log that a stop is sent again, the first time and then once a second."""
+        if self._reported_s is not None and time_s - self._reported_s < REPORT_EVERY_S:
+            return
+        self._reported_s, since_s = time_s, time_s - self._begun_s
+        seen = f"no status ({self._unread})" if now is None else f"at {now.position_deg:g} deg"
+        log.warning("%s: no rest %.2f s after a stop, %s: sent again", self._name, since_s, seen)
 
     def _until_s(self) -> float:
         """Return the time of the clock until which the stage must be read to stand.

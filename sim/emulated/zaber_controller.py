@@ -65,7 +65,7 @@ class ZaberController:
     def _answer_line(self, line: bytes) -> bytes:
         text, colon, check = line.decode("ascii", "replace").partition(":")
         found = _COMMAND.fullmatch(text)
-        if found is None or (colon and int(check or "0", 16) != _checksum(text[1:])):
+        if found is None or (colon and check.upper() != f"{_checksum(text[1:]):02X}"):
             return b""  # no reply to a wrong checksum
         device, axis, number, words = found.groups()
         if device not in (None, "0", "00", str(self.device), f"{self.device:02d}"):

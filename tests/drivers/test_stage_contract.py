@@ -169,6 +169,7 @@ def test_a_stop_ends_a_move_before_its_target(tested: StageUnderTest) -> None:
     stage = tested.homed()
     stage.start_move(tested.at(0.9))
     stage.stop()
+    assert stage.position_deg() == tested.near(stage.position_deg())  # it stands
     try:
         where = stage.wait()
     except DeviceError:

@@ -54,12 +54,15 @@ class MemoryWire:
     """A controller right behind the driver's port.
 
     `spoil` turns a genuine answer into what reaches the driver; `heard` is everything that did.
+    `spoil_request` turns a request into what reaches the controller; `sent` are all requests.
     """
 
     def __init__(self, controller: Controller, clock: SimulatedClock) -> None:
         self._controller, self.clock = controller, clock
         self.inbox = b""
         self.spoil: Callable[[bytes], bytes] = lambda answer: answer
+        self.spoil_request: Callable[[bytes], bytes] = lambda data: data
+        self.sent: list[bytes] = []
         self.heard = bytearray()
         self.genuine: list[bytes] = []
 
@@ -69,7 +72,8 @@ class MemoryWire:
 
     def request(self, data: bytes) -> None:
         """Pass on a request; the answer is there at once."""
-        answer = self._controller.answer(data)
+        self.sent.append(data)
+        answer = self._controller.answer(self.spoil_request(data))
         if answer:
             self.genuine.append(answer)
             answer = self.spoil(answer)
