@@ -35,8 +35,8 @@ SLOWLY = replace(
 class Setup:
     """A homed stage on a plug; sleeps between tries to open its port take no time."""
 
-    def __init__(self, kind: str, link: Path) -> None:
-        self.kind, self.clock = kind, EventfulClock(REOPEN_EVERY_S)
+    def __init__(self, kind: str, link: Path, clock: EventfulClock | None = None) -> None:
+        self.kind, self.clock = kind, clock or EventfulClock(REOPEN_EVERY_S)
         self.motor = Motor(SLOW, self.clock)
         controller, self.moves = controller_for(kind, self.motor, self.clock)
         self.plug = Plug(link, controller)
@@ -85,6 +85,22 @@ def test_a_port_that_stays_away_is_an_error_after_2_s(setup: Setup) -> None:
     with pytest.raises(PortGone, match=r"theta_r.*look at"):
         setup.stage.stop()
     assert REOPEN_S < setup.clock.now_s() - begun_s < 1.5 * REOPEN_S
+
+
+def test_three_ports_that_stay_away_take_as_long_as_one(tmp_path: Path) -> None:
+    clock = EventfulClock(REOPEN_EVERY_S)
+    setups = [Setup(kind, tmp_path / kind, clock) for kind in KINDS]
+    for setup in setups:
+        setup.plug.pull_out()
+    begun_s = clock.now_s()
+    for setup in setups:
+        setup.stage.begin_stop()
+    for setup in setups:
+        with pytest.raises(PortGone, match=r"theta_r: stop not sent, and not read to stand"):
+            setup.stage.finish_stop()
+    assert clock.now_s() - begun_s < 1.5 * REOPEN_S
+    for setup in setups:
+        setup.stage.close()
 
 
 def test_a_numbered_name_is_opened_again_for_a_stop_only(
@@ -149,8 +165,12 @@ def held() -> Iterator[tuple[NewportStage, PtyWire, Motor]]:
         stage = NewportStage("theta_r", line, 1, "SMC100", SLOWLY, clock)
         stage.home()
         stage.start_move(70.0)
-        wire.send_noise(b"\x13")  # XOFF
+        wire.send_noise(XOFF)
         yield stage, wire, motor
+        stage.close()
+
+
+XOFF = b"\x13"
 
 
 def test_a_stop_passes_a_line_that_an_xoff_holds(
@@ -158,8 +178,46 @@ def test_a_stop_passes_a_line_that_an_xoff_holds(
 ) -> None:
     stage, _, motor = held
     stage.stop()
-    wait_until(lambda: not motor.moving)
+    assert not motor.moving
     assert motor.position_deg < 60.0
+
+
+@pytest.mark.parametrize("lost", [1, 2])
+def test_a_stop_is_sent_again_where_xoffs_hold_the_line_and_stops_are_lost(
+    held: tuple[NewportStage, PtyWire, Motor], lost: int
+) -> None:
+    """Each lost stop is followed by another XOFF, so that the status cannot be asked for."""
+    stage, wire, motor = held
+    left = [b"T"] * lost
+
+    def spoilt(data: bytes) -> bytes:
+        if b"ST" not in data or not left:
+            return data
+        wire.send_noise(XOFF)
+        return data.replace(b"S", left.pop())
+
+    wire.spoil_request = spoilt
+    stage.stop()
+    assert not left
+    assert not motor.moving
+    assert motor.position_deg < 60.0
+
+
+def test_bytes_that_the_system_holds_back_are_discarded_before_a_stop(
+    held: tuple[NewportStage, PtyWire, Motor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A driver of a real port queues what an XOFF holds; here the port only says so."""
+    line = held[0]._port.line
+    port = line._serial
+    done: list[str] = []
+    monkeypatch.setattr(port, "reset_output_buffer", lambda: done.append("discarded"))
+    queue = [5, 2]  # bytes on their way are left alone
+    monkeypatch.setattr(type(port), "out_waiting", property(lambda _: queue.pop(0)))
+    line._free_output(port)
+    assert not done
+    queue.extend([5, 5])
+    line._free_output(port)
+    assert done == ["discarded"]
 
 
 def test_a_query_recovers_from_an_xoff(held: tuple[NewportStage, PtyWire, Motor]) -> None:
