@@ -71,6 +71,10 @@ class Wire(Closeable):
         with self._lock:
             self._faults.clear()
 
+    def received(self) -> int:
+        """Return the number of bytes received from the master."""
+        return sum(len(data) for _, data in self.seen)
+
     @property
     def pending(self) -> int:
         """Number of faults not applied yet."""

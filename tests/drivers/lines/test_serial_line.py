@@ -27,7 +27,7 @@ BOUND_S = 3.0
 ONCE = {
     "drop": Fault("drop"),
     "delay": Fault("delay", 0.1),
-    "late": Fault("late", 0.4),
+    "late": Fault("late", 0.3),  # in the midst of the next exchange: 0.15 s of time-out, 0.1 quiet
     "garbage": Fault("garbage"),
     "truncate": Fault("truncate"),
     "nul": Fault("nul"),
