@@ -12,11 +12,14 @@ from acquisition.rig import OpenRig, restart_for_emulated_camera
 from acquisition.terminal.console import console, out
 from acquisition.terminal.operator import require_yes
 from acquisition.terminal.orderly_end import orderly_end
+from acquisition.terminal.stop_signals import reason
 from acquisition.terminal.stop_thread import stopped_by_signals
 from instrument.config.axes import AXES, HandAxis, MotorAxis
 from instrument.config.load import load_rig
 from instrument.config.rig import Rig
 from instrument.errors import DeviceError, InputError, OperatorStop
+
+_ENDED = ": all motion has ended"
 
 
 def home_axis(axis: str, rig_path: Path | None, yes: bool) -> None:
@@ -75,16 +78,24 @@ def _stopped_at_an_error(axis: Axis) -> Iterator[None]:
             trouble = _trouble_of_stop(axis)
             if isinstance(error, KeyboardInterrupt):
                 why = str(error) or "stopped by the operator"
-                raise OperatorStop(why + (trouble or ": all motion has ended")) from None
+                raise OperatorStop(f"{why}{trouble or _ENDED}") from None
+            if isinstance(error, DeviceError) and reason():  # a signal came as well
+                raise OperatorStop(f"{reason()}{trouble or _ENDED}\n{error}") from error
             if isinstance(error, DeviceError) and trouble:
                 raise type(error)(f"{error}{trouble}") from error
             raise
 
 
 def _trouble_of_stop(axis: Axis) -> str:
-    """Stop an axis; return the line to be added to the reason if that failed, else nothing."""
+    """Stop an axis; return the line to be added to the reason if that failed, else nothing.
+
+    A signal that comes meanwhile does not keep it from being known whether the axis stands.
+    """
     try:
-        axis.stop()
+        try:
+            axis.stop()
+        except KeyboardInterrupt:
+            axis.stop()
     except (DeviceError, OSError) as error:
         return f"\nLOOK AT THE RIG FIRST: {axis.name} could not be stopped: {error}"
     return ""

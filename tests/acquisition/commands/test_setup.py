@@ -19,7 +19,7 @@ from acquisition.engine.axis import Axis
 from acquisition.rig import OpenRig
 from instrument.clock import SystemClock
 from instrument.config.load import load_rig
-from instrument.errors import InputError
+from instrument.errors import DeviceError, InputError, OperatorStop
 from tests.support.command import gonio_here as gonio
 from tests.support.paths import CONFIGS, ROOT
 from tests.support.stages.emulated_stages import EMULATED_STAGES, SLOW
@@ -165,6 +165,31 @@ def at_terminal(arguments: list[object], replies: dict[str, str], until: str) ->
     os.waitpid(pid, 0)
     assert until in text, text
     return text
+
+
+class Lost:
+    """An axis whose port is gone, and whose first stop is interrupted by a signal."""
+
+    name = "theta_r"
+    stops = 0
+
+    def stop(self) -> None:
+        self.stops += 1
+        if self.stops == 1:
+            raise KeyboardInterrupt
+        raise DeviceError("theta_r: its port is gone")
+
+
+def test_a_signal_while_a_lost_axis_is_stopped_keeps_the_warning(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(setup, "reason", lambda: "stopped by the operator")
+    words = "^stopped by the operator\nLOOK AT THE RIG FIRST: theta_r .* gone\ntheta_r: no answer"
+    with (
+        pytest.raises(OperatorStop, match=words),
+        setup._stopped_at_an_error(Lost()),  # type: ignore[arg-type]  # a stand-in
+    ):
+        raise DeviceError("theta_r: no answer")
 
 
 def test_nothing_real_moves_before_somebody_has_said_so(real_rig: Path) -> None:

@@ -125,8 +125,8 @@ class Devices:
     def obey(self, order: dict[str, Any]) -> Any:
         """Do what the trial asks for."""
         match order.pop("do"):
-            case "spoil stop":
-                self.spoiling.spoil_stop(**order)
+            case "spoil":
+                self.spoiling.spoil(**order)
             case "lose answers":
                 self.spoiling.lose_answers(**order)
             case "noise":

@@ -55,8 +55,8 @@ _PREPARED = (
 class Program:
     """One run of the command; `text`: everything it has said at its terminal or on `errors`.
 
-    `waits`: times, and for how long the command's threads had until then been ready to run without
-    a processor, in s.
+    `waits`: times, and for how long each of its threads had until then been ready to run without a
+    processor, in s.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class Program:
         self._text, self._errors = b"", errors
         self.code: int | None = None
         self.ended_s = float("inf")
-        self.waits: list[tuple[float, float]] = []
+        self.waits: list[tuple[float, dict[str, float]]] = []
         self.pid = os.fork()
         if self.pid == 0:
             _become(folder, arguments, real_start, slave, errors)
@@ -136,14 +136,13 @@ class Program:
             os.close(terminal)
 
     def _note_waits(self) -> None:
-        total_ns = 0
+        waits = dict(self.waits[-1][1]) if self.waits else {}  # those of ended threads stay
         for thread in Path(f"/proc/{self.pid}/task").glob("*"):
             try:
-                total_ns += int((thread / "schedstat").read_text().split()[1])
+                waits[thread.name] = int((thread / "schedstat").read_text().split()[1]) * 1e-9
             except (OSError, IndexError):
                 continue
-        before_s = self.waits[-1][1] if self.waits else 0.0  # a thread that ended is not counted
-        self.waits.append((time.monotonic(), max(before_s, total_ns * 1e-9)))
+        self.waits.append((time.monotonic(), waits))
 
 
 def _become(

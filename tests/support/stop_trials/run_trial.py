@@ -37,7 +37,7 @@ class Seen:
     code: int | None = None
     ended_s: float = math.inf
     text: str = ""
-    waits: list[tuple[float, float]] = field(default_factory=list)
+    waits: list[tuple[float, dict[str, float]]] = field(default_factory=list)
     at_end: dict[str, Any] = field(default_factory=dict)
     at_rest: dict[str, Any] = field(default_factory=dict)
     next_code: int | None = None
@@ -89,10 +89,12 @@ class _Course:
         number, until_s = self._trial.number, time.monotonic() + BEFORE_FIRST_S
         if self._trial.fault not in ON_DISK:
             return self._motion(kind, number, until_s)
-        before = self._motion(kind, number, until_s)
-        if before is not None:  # the reading after it is written during the next motion
-            self._wait_until(before["ends_s"] - _TICK_S)
+        first = self._motion(kind, number, until_s)
+        if first is not None and kind == "move":  # its reading is written during the next motion
+            self._wait_until(first["ends_s"] - _TICK_S)
         self._hang()
+        if kind == "home":
+            return first
         return self._motion(kind, number + 1, time.monotonic() + _NEXT_S)
 
     def _motion(self, kind: str, number: int, until_s: float) -> dict[str, Any] | None:
@@ -130,7 +132,7 @@ class _Course:
         trial, bench = self._trial, self._bench
         match trial.fault:
             case "lost byte" | "garbled byte":
-                bench.ask("spoil stop", fault=trial.fault, at=trial.at)
+                bench.ask("spoil", fault=trial.fault, at=trial.at, back=trial.back)
             case "lost answers":
                 bench.ask("lose answers", seconds=trial.seconds)
             case "noise":

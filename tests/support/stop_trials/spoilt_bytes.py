@@ -26,26 +26,31 @@ class Spoiling:
 
     stop: bytes
     log: list[tuple[float, str, bytes]] = field(default_factory=list)
-    _change: Callable[[bytes], bytes] | None = None
+    _change: Callable[[bytes, int, int], bytes] | None = None
+    _spoils_back: bool = False
+    _stopped: bool = False
     _mute_until_s: float = 0.0
 
-    def spoil_stop(self, fault: str, at: float) -> None:
-        """Lose, or change, one byte of the next stop: the one at this part of its length."""
+    def spoil(self, fault: str, at: float, back: bool) -> None:
+        """Lose, or change, one byte at this part of the length of the next stop.
 
-        def changed(data: bytes) -> bytes:
-            index = self._begin(data)
-            end = data.find(b"\n", index) + 1 or len(data)
-            index += int(at * (end - index))
+        `back`: of the first answer after it.
+        """
+
+        def changed(data: bytes, begin: int, end: int) -> bytes:
+            index = begin + int(at * (end - begin))
             kept = b"" if fault == "lost byte" else bytes([data[index] ^ 0x15])
             return data[:index] + kept + data[index + 1 :]
 
-        self._change = changed
+        self._change, self._spoils_back = changed, back
 
-    def _begin(self, data: bytes) -> int:
-        """Index of the first byte of the message that holds the stop."""
+    def _place(self, data: bytes) -> tuple[int, int]:
+        """Return where the message begins and ends that holds the stop."""
         found = data.find(self.stop)
-        before = data.rfind(b"\n", 0, found) + 1
-        return before if self.stop.isalpha() or self.stop[:1] == b" " else max(found - 1, 0)
+        if not self.stop.strip().isalpha():  # a frame: the function follows the unit address
+            return max(found - 1, 0), len(data)
+        end = data.find(b"\n", found) + 1
+        return data.rfind(b"\n", 0, found) + 1, end or len(data)
 
     def lose_answers(self, seconds: float) -> None:
         """Lose all answers from now on, for so long."""
@@ -53,17 +58,23 @@ class Spoiling:
 
     def on_the_way(self, data: bytes) -> bytes:
         """Return what reaches the controller."""
-        if self._change is not None and self.stop in data:
-            change, self._change = self._change, None
-            data = change(data)
+        if self.stop in data:
+            self._stopped = True
+            if self._change is not None and not self._spoils_back:
+                change, self._change = self._change, None
+                data = change(data, *self._place(data))
         self.log.append((time.monotonic(), "in", data))
         return data
 
     def back(self, answer: bytes) -> bytes:
         """Return what reaches the program."""
+        if not answer:
+            return b""
+        if self._change is not None and self._spoils_back and self._stopped:
+            change, self._change = self._change, None
+            answer = change(answer, 0, len(answer))
         kept = b"" if time.monotonic() < self._mute_until_s else answer
-        if answer:
-            self.log.append((time.monotonic(), "out" if kept else "lost", answer))
+        self.log.append((time.monotonic(), "out" if kept else "lost", answer))
         return kept
 
 
@@ -86,5 +97,5 @@ class SpoiltDrive:
     def serve(self, request: bytes) -> bytes:
         arrived = self._spoiling.on_the_way(request)
         answer = self._drive.serve(request) if arrived == request else b""
-        silent = bytes([0x80 | request[0], _GATEWAY_SILENT])
-        return self._spoiling.back(answer) or silent
+        whole = answer and self._spoiling.back(answer) == answer
+        return answer if whole else bytes([0x80 | request[0], _GATEWAY_SILENT])

@@ -27,7 +27,8 @@ class Trial:
 
     `signal` is empty where only the fault itself may end the command. `moment` is a part of the
     motion's duration at which the signal is sent, or the fault begins where it comes without one;
-    `number` of the motion, counted from 1; for a disk, of the one before.
+    `number` of the motion, counted from 1; in a scan whose disk hangs, of the one before. `back`:
+    the byte is one of the first answer after the stop.
     `ahead_s` is how long before a signal its fault begins. `at` is the place in a message, as a
     part of its length, and `seconds` the duration of a fault, infinite where it stays.
     """
@@ -41,6 +42,7 @@ class Trial:
     moment: float
     ahead_s: float
     at: float
+    back: bool
     seconds: float
     real_start: bool
     at_once: bool
@@ -67,9 +69,7 @@ def draw(seed: int) -> Trial:
         controller = rng.choice(("smc100", "smc100", "smc100", "zaber", "conex", "az rtu"))
     motion = rng.choice(("moving", "homing"))
     command = {"moving": "move", "homing": "home"}[motion]
-    if fault in ON_DISK:  # a scan is homed before its first reading is written
-        command, motion = "run", "moving"
-    elif rng.random() < 0.2:
+    if fault in ON_DISK or rng.random() < 0.2:
         command = "run"
     speed = rng.uniform(20.0, 60.0)
     start, target = _way(rng)
@@ -83,12 +83,13 @@ def draw(seed: int) -> Trial:
         moment=_moment(rng),
         ahead_s=rng.choice((0.0, rng.uniform(0.0, 0.05), rng.uniform(0.0, 0.5))),
         at=rng.random(),
+        back=rng.random() < 0.25,
         seconds=_seconds(rng, fault),
         real_start=command != "run" and rng.random() < 0.12,
         at_once=rng.random() < 0.5,
         speed_deg_per_s=speed,
         acceleration_deg_per_s2=speed / rng.uniform(0.05, 0.6),
-        homing_s=rng.uniform(0.6, 2.0) if motion == "homing" else 0.2,
+        homing_s=rng.uniform(0.8, 3.0) if motion == "homing" else 0.2,
         start_deg=start,
         target_deg=target,
         number=_number(rng, fault, command, motion),
@@ -97,15 +98,15 @@ def draw(seed: int) -> Trial:
 
 def _number(rng: random.Random, fault: str, command: str, motion: str) -> int:
     """Return the number of the motion; a scan's first readings wait for the disk before a move."""
-    if fault in ON_DISK:
-        return rng.choice((1, 2, 2, 3, 3, 3))
-    return rng.choice((1, 2)) if command == "run" and motion == "moving" else 1
+    if command != "run" or motion == "homing":
+        return 1
+    return rng.choice((1, 2, 2, 3, 3, 3) if fault in ON_DISK else (1, 2))
 
 
 def _way(rng: random.Random) -> tuple[float, float]:
-    """Return where the axis stands and where it is sent, at least 40 degrees apart."""
-    start = rng.uniform(-85.0, 45.0)
-    target = rng.uniform(start + 40.0, 87.0)
+    """Return where the axis stands and where it is sent, at least 60 degrees apart."""
+    start = rng.uniform(-85.0, 25.0)
+    target = rng.uniform(start + 60.0, 87.0)
     return (start, target) if rng.random() < 0.5 else (-start, -target)
 
 

@@ -22,7 +22,7 @@ _ENDED = "all motion has ended"
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Verdict: `how` is stood, said, ended (before the signal), or for a dead program finished.
+    """Verdict: `how` is stood, said, ended (by itself, with 0), or for a dead program finished.
 
     `after_s`: from the moment at which a stop was possible to the standstill; `late_s`: for how
     long the machine kept devices and program waiting within it. `moved`: the axis was moving when
@@ -48,9 +48,9 @@ def verdict(trial: Trial, seen: Seen) -> Verdict:
         return Verdict("finished", tuple(wrong), moved=moved)
     after_s, braking_s, late_s = _standstill(seen)
     in_time = after_s <= STANDS_WITHIN_S + braking_s + late_s
-    said = says_that_it_may_move(seen.text)
-    if not in_time and seen.code == 0 and _arrived(trial, seen):
+    if seen.code == 0 and _arrived(seen) and (in_time or not trial.signal):
         return Verdict("ended", tuple(wrong), moved=moved)
+    said = says_that_it_may_move(seen.text)
     if not in_time and not said:
         wrong.append(
             f"stood after {after_s:.2f} s (braking {braking_s:.2f} s, waited {late_s:.2f} s), and "
@@ -64,7 +64,7 @@ def verdict(trial: Trial, seen: Seen) -> Verdict:
 
 def says_that_it_may_move(text: str) -> bool:
     """True if a line names the axis and says that it may be moving."""
-    return "theta_r" in text and bool(_MAY_MOVE.search(text))
+    return any("theta_r" in line and _MAY_MOVE.search(line) for line in text.splitlines())
 
 
 def _crashes(seen: Seen) -> list[str]:
@@ -142,7 +142,7 @@ def _names(at_deg: float, text: str) -> bool:
     return any(abs(number - at_deg) <= TOLERANCE_DEG for number in numbers)
 
 
-def _arrived(trial: Trial, seen: Seen) -> bool:
+def _arrived(seen: Seen) -> bool:
     """True if the last motion has come to its own end."""
     motions = seen.at_rest["motions"]
     return bool(motions) and motions[-1]["kind"] != "brake" and not seen.at_rest["moving"]
@@ -166,11 +166,14 @@ def _moved(seen: Seen) -> bool:
     return bool(begun) and begun[-1]["ends_s"] > seen.struck_s
 
 
-def _waited_s(waits: list[tuple[float, float]], from_s: float, to_s: float) -> float:
-    """Return for how long the program had no processor between two times."""
+def _waited_s(waits: list[tuple[float, dict[str, float]]], from_s: float, to_s: float) -> float:
+    """Return for how long the program had no processor between two times.
+
+    One thread may wait for another: the two that waited longest count.
+    """
     if not waits:
         return 0.0
     times = [at_s for at_s, _ in waits]
-    first = max(bisect(times, from_s) - 1, 0)
-    last = min(bisect(times, to_s), len(waits) - 1)
-    return max(waits[last][1] - waits[first][1], 0.0)
+    before = waits[max(bisect(times, from_s) - 1, 0)][1]
+    after = waits[min(bisect(times, to_s), len(waits) - 1)][1]
+    return sum(sorted(after[thread] - before.get(thread, 0.0) for thread in after)[-2:])
