@@ -10,7 +10,7 @@ import pytest
 
 from tests.support.command import gonio_here
 from tests.support.scans import small_demo
-from tests.support.struck_command import struck
+from tests.support.whole_scans.struck_command import struck
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP)
 TRIALS, SLOW_TRIALS = 20, 240
