@@ -7,6 +7,7 @@ again: only the operator may resume the scan.
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -17,10 +18,13 @@ from acquisition.engine.exposer import Exposed, Exposer
 from acquisition.engine.frame_files import write_frames
 from acquisition.engine.positioner import Positioner
 from acquisition.engine.preview import make_preview
-from acquisition.engine.resume import Progress, check_text, report_found
+from acquisition.engine.resume import Progress, report_found
 from acquisition.engine.retrying_camera import RetryingCamera
 from acquisition.interlocks.frame_scatter import FrameScatter
+from acquisition.interlocks.lamp_checks import check_text, failed
+from acquisition.interlocks.references import References, what_to_look_at
 from acquisition.interlocks.watched_camera import WatchedCamera
+from acquisition.measure.drift import is_usable
 from acquisition.measure.placement import Placement
 from acquisition.measure.radiometry import Signal, measure
 from acquisition.measure.window import Window, window_at
@@ -31,11 +35,15 @@ from instrument.clock import Clock
 from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
 from instrument.devices import Camera, Lamp, Operator, Surface
-from instrument.errors import DeviceError
+from instrument.errors import DeviceError, Interlock
 from instrument.pinhole import Pinhole
 from instrument.record.event_kinds import DRIFT, INTERLOCK, OPERATOR
 from instrument.record.reading import Reading
 from instrument.record.record import Record
+
+log = logging.getLogger("acquisition.interlocks")
+
+ATTEMPTS = 2  # at a drift check or a reading of the white tile, before it ends the scan
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +78,7 @@ class Engine:
         self._record, self._on_step = record, on_step
         self._pinhole = Pinhole.of(rig)
         self._ended = False
+        self._references = References(rig)
         note = partial(self._add_event, OPERATOR)
         self._positioner = Positioner(rig, devices.axes, devices.lamp, devices.operator, note)
         self._scatter = FrameScatter(rig, partial(self._add_event, INTERLOCK))
@@ -140,11 +149,15 @@ class Engine:
         self._exposer.restore(progress.readings)
         self._exposer.take_darks(plan.darks_first_s, self._window(self._positioner.pose))
         kept = {reading.block for reading in progress.readings}
-        for number, steps in enumerate(progress.missing_by_block(plan)):
-            if number == 0 or steps[0].block in kept:
-                so_far = progress if number == 0 else Progress.of(self._record)
-                self._continue_from(plan, so_far, steps[0])
-            self._scan(plan, steps)
+        blocks = list(dict.fromkeys(step.block for step in progress.missing(plan)))
+        for number, block in enumerate(blocks):
+            if number == 0 or block in kept:
+                self._continue_from(plan, progress, progress.missing_in(block, plan)[0])
+            progress = Progress.of(self._record)  # a lamp that has jumped casts doubt on readings
+            self._references.restore(progress.references(), progress.checks)
+            self._record.allow_replacing(progress.doubtful)
+            self._scan(plan, progress.missing_in(block, plan))
+            progress = Progress.of(self._record)
 
     def _continue_from(self, plan: Plan, progress: Progress, first: Step) -> None:
         """Check the lamp for drift, and return to the last accepted pose."""
@@ -169,9 +182,18 @@ class Engine:
         self._place(step.surface)
         self._positioner.move_to(step.pose)
         elapsed_s = progress.elapsed_s
-        reading = self._measure(self._expose(step))
-        reading = replace(reading, step=original.index, time_s=elapsed_s, free_s=elapsed_s)
-        check = progress.check_drift(reading, first)
+        for attempt in range(ATTEMPTS):
+            reading = self._measure(self._expose(step))
+            reading = replace(reading, step=original.index, time_s=elapsed_s, free_s=elapsed_s)
+            check = progress.check_drift(reading, first)
+            if not failed(check):
+                break
+            if attempt + 1 < ATTEMPTS:
+                log.warning("interlock drift check: %s: measured again", check_text(check))
+        if not is_usable(reading):
+            raise Interlock(
+                f"interlock drift check: {check_text(check)}; {what_to_look_at(reading)}"
+            )
         self._record.add_check(check)
         self._add_event(DRIFT, check_text(check))
 
@@ -197,6 +219,9 @@ class Engine:
             self._accept(waiting)
             self._positioner.finish_moves()
             waiting = self._expose(step)
+            if step.kind != "point":
+                self._accept_reference(waiting)
+                waiting = None
         self._accept(waiting)
 
     def _begin_step(self, index: int, scan_s: float) -> None:
@@ -224,11 +249,33 @@ class Engine:
         known = 0.0 if math.isnan(theta_r) else theta_r
         return window_at(known, self._pinhole, patch.width_mm, patch.height_mm)
 
+    def _accept_reference(self, exposed: Exposed) -> None:
+        """Accept a tile reading or drift check, if need be a second one; else raise `Interlock`.
+
+        The rig stands: no point follows a reference that proves nothing.
+        """
+        reading = self._measure(exposed)
+        doubt = self._references.doubt(reading)
+        if doubt:
+            log.warning("interlock %s: measured again", doubt)
+            exposed = self._expose(exposed.step)
+            reading = self._measure(exposed)
+            doubt = self._references.doubt(reading)
+        if doubt:
+            check = self._references.failed_check(reading)
+            if check is not None:
+                self._record.add_check(check)
+            raise Interlock(f"interlock {doubt}; {what_to_look_at(reading)}")
+        self._references.accept(reading)
+        self._commit(exposed, reading)
+
     def _accept(self, exposed: Exposed | None) -> None:
-        """Reduce the frames of a step and commit them to the record."""
-        if exposed is None:
-            return
-        step, reading = exposed.step, self._measure(exposed)
+        """Reduce the frames of a point and commit them to the record."""
+        if exposed is not None:
+            self._commit(exposed, self._measure(exposed))
+
+    def _commit(self, exposed: Exposed, reading: Reading) -> None:
+        step = exposed.step
         preview, files = None, list[str]()
         if step.preview:
             preview = make_preview(exposed, self._window(step.pose), self._rig.camera.max_dn)

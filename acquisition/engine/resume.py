@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import groupby
 
-from acquisition.measure.drift import JUMP_U, MIN_JUMP, Drift, is_usable, rate
+from acquisition.interlocks.lamp_checks import compared, doubtful_steps
+from acquisition.measure.drift import is_usable
 from acquisition.plan.plan import Plan, Step
 from instrument.config.rig import Rig
 from instrument.record.reading import Check, Reading
@@ -30,28 +29,40 @@ class Progress:
         return cls(tuple(record.readings()), tuple(record.checks()))
 
     @property
+    def doubtful(self) -> frozenset[int]:
+        """Indices of accepted steps to be measured again: the next drift check failed."""
+        return doubtful_steps(self.readings, self.checks)
+
+    @property
     def done(self) -> frozenset[int]:
-        """Indices of the accepted steps."""
-        return frozenset(reading.step for reading in self.readings)
+        """Indices of the accepted steps that stay."""
+        return frozenset(reading.step for reading in self.readings) - self.doubtful
+
+    def references(self) -> list[Reading]:
+        """Return the tile readings and drift checks that stay."""
+        return [r for r in self.readings if r.kind != "point" and r.step in self.done]
 
     @property
     def elapsed_s(self) -> float:
         """Duration of the scan so far, without interruptions."""
-        return max((reading.free_s for reading in self.readings), default=0.0)
+        made = (*self.readings, *(check.reading for check in self.checks))
+        return max((reading.free_s for reading in made), default=0.0)
 
     def missing(self, plan: Plan) -> tuple[Step, ...]:
         """Return the steps still to be measured, in order."""
         done = self.done
         return tuple(step for step in plan.steps if step.index not in done)
 
-    def missing_by_block(self, plan: Plan) -> list[list[Step]]:
-        """Return the steps still to be measured, those of each block of the lamp in a list."""
-        return [list(steps) for _, steps in groupby(self.missing(plan), key=lambda s: s.block)]
+    def missing_in(self, block: int, plan: Plan) -> list[Step]:
+        """Return the steps of one block of the lamp that are still to be measured, in order."""
+        return [step for step in self.missing(plan) if step.block == block]
 
     def drift_step(self, plan: Plan, block: int) -> Step | None:
         """Return the step of the block's last usable drift check, or None without one."""
         latest = sorted(self.readings, key=lambda r: -r.time_s)
-        checks = (r for r in latest if r.kind == "drift" and r.block == block)
+        done = self.done
+        own = (r for r in latest if r.block == block and r.step in done)
+        checks = (r for r in own if r.kind == "drift")
         return next((plan.steps[r.step] for r in checks if is_usable(r)), None)
 
     def last_step(self, plan: Plan, block: int) -> Step | None:
@@ -61,15 +72,7 @@ class Progress:
 
     def check_drift(self, repeated: Reading, next_step: Step) -> Check:
         """Compare the repeated drift reference with the rate predicted from earlier checks."""
-        drift = Drift.of(self.readings, next_step.block, self.checks)
-        expected, u_relative = drift.predicted_rate(self.elapsed_s)
-        u = math.hypot(u_relative * expected, repeated.u_noise_dn / repeated.exposure_s)
-        deviation = abs(rate(repeated) - expected)
-        jumped = is_usable(repeated) and deviation > max(JUMP_U * u, MIN_JUMP * expected)
-        return Check(
-            before_step=next_step.index, expected=expected, u_expected=u, jumped=jumped,
-            reading=repeated,
-        )  # fmt: skip
+        return compared(repeated, self.readings, self.checks, next_step.index)
 
 
 def report_found(found: Mapping[str, float], progress: Progress, rig: Rig) -> None:
@@ -89,16 +92,3 @@ def report_found(found: Mapping[str, float], progress: Progress, rig: Rig) -> No
                 "%s: found at %.4f deg; the last reading had been taken at %g deg",
                 name, at_deg, before_deg,
             )  # fmt: skip
-
-
-def check_text(check: Check) -> str:
-    """Return the outcome of a drift check in words."""
-    text = (
-        f"drift reference measured again: {rate(check.reading):.5g} DN/s, {check.expected:.5g} "
-        f"expected (u {check.u_expected:.2g})"
-    )
-    if check.jumped:
-        return f"{text}: the lamp has jumped, later levels refer to this check"
-    if not is_usable(check.reading):
-        return f"{text}: not usable ({check.reading.flags or 'too little signal'})"
-    return f"{text}: as before"

@@ -13,6 +13,7 @@ from instrument.record.reading import Check, Reading
 
 MIN_SIGNAL_U = 10.0  # with less signal, in u, a check shows noise and not the lamp
 JUMP_U, MIN_JUMP = 4.0, 0.003  # a jump exceeds both: in u, and relative
+_WARM_UP_PER_S, _WARM_UP = 1.0 / 3600.0, 0.02  # at most, before two checks show a trend (assumed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +68,25 @@ class _Segment:
         share = outside_s / float(self.times_s[-1] - self.times_s[0])
         return math.hypot(4 * bend * share * (1 + share), math.sqrt(2) * noise * share)
 
+    @property
+    def u_between(self) -> FloatArray:
+        """Standard uncertainty of a level between two checks, (checks - 1,), relative.
+
+        A change that the intervals beside it do not share may have come at any moment of its own
+        interval: of a step J, interpolated by a straight line, J / sqrt(6) is left on average. What
+        is no jump, by `JUMP_U` and `MIN_JUMP`, counts as steady.
+        """
+        apart_s, changes = np.diff(self.times_s), np.diff(self.level)
+        rates, u_rates = (
+            np.divide(part, apart_s, out=np.zeros(changes.size), where=apart_s > 0)
+            for part in (changes, np.full(changes.size, math.sqrt(2) * np.max(self.u_relative)))
+        )
+        beside, u_beside = _rates_beside(rates, u_rates)
+        unshared = np.abs(rates - beside) * apart_s
+        noise = JUMP_U * np.hypot(u_rates, u_beside) * apart_s
+        jumps: FloatArray = np.where(unshared > np.maximum(noise, MIN_JUMP), unshared, 0.0)
+        return jumps / math.sqrt(6)
+
     def interpolation(self, times_s: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return for times (N,) the index of the preceding check and the next one's weight."""
         last = self.times_s.size - 1
@@ -76,6 +96,20 @@ class _Segment:
         since_s = np.clip(times_s - self.times_s[before], 0.0, apart_s)
         weight = np.divide(since_s, apart_s, out=np.zeros(times_s.size), where=apart_s > 0)
         return before.astype(np.int64), weight
+
+
+def _rates_beside(rates: FloatArray, u_rates: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the mean rate of change of the intervals beside each, (N,), and its uncertainty.
+
+    A single interval is compared with a constant level.
+    """
+    if rates.size < 2:
+        return np.zeros(rates.size), np.zeros(rates.size)
+    mean, u_mean = (rates[:-2] + rates[2:]) / 2, np.hypot(u_rates[:-2], u_rates[2:]) / 2
+    return (
+        np.concatenate([rates[1:2], mean, rates[-2:-1]]),
+        np.concatenate([u_rates[1:2], u_mean, u_rates[-2:-1]]),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,10 +163,24 @@ class Drift:
         segment = self._segment(time_s)
         return 0.0 if segment is None else segment.u_extrapolated(time_s)
 
+    def u_between(self, times_s: FloatArray) -> FloatArray:
+        """Return the relative standard uncertainty, (N,), of levels at times (N,) in s.
+
+        It is 0 outside the checks.
+        """
+        u = np.zeros(times_s.size)
+        for segment in self.segments:
+            own = np.searchsorted(segment.times_s, times_s) - 1
+            inside = (own >= 0) & (times_s <= segment.times_s[-1])
+            u[inside] = segment.u_between[own[inside]]
+        return u
+
     def predicted_rate(self, time_s: float) -> tuple[float, float]:
         """Return the counts per second expected of a check at that time, and their relative u."""
         last = self.segments[-1]
         u_relative = math.hypot(float(last.u_relative[-1]), self.u_extrapolated(time_s))
+        if last.times_s.size < 2:
+            u_relative = math.hypot(u_relative, u_unknown_trend(last.outside_s(time_s)))
         return self.first_rate * last.at(time_s), u_relative
 
     def interpolation(self, times_s: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -154,6 +202,15 @@ class Drift:
         """Return the last segment that began before that time, or else the first."""
         begun = [s for s in self.segments[1:] if s.times_s[0] < time_s]
         return (*self.segments[:1], *begun)[-1] if self.segments else None
+
+
+def u_unknown_trend(apart_s: float) -> float:
+    """Return the standard uncertainty of a lamp's relative level after a time, trend unknown.
+
+    A lamp that warms up may change by four times as much (`JUMP_U`): 1.7 % a minute, and 2 %
+    between two checks. What changes more has jumped, or is not warm enough to measure with.
+    """
+    return min(_WARM_UP_PER_S * abs(apart_s), _WARM_UP) / JUMP_U
 
 
 def is_usable(check: Reading) -> bool:

@@ -8,11 +8,13 @@ section 3). Use `reduced_run` for a record, and `reduce` for readings in memory.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from acquisition.interlocks.lamp_checks import UNPROVEN, doubtful_steps
+from acquisition.interlocks.no_light import NO_SIGNAL, unlit_steps
 from acquisition.measure.drift import Drift, rate
 from acquisition.measure.placement import tilt_deg
 from analysis.data.measurements import SharedError
@@ -27,9 +29,10 @@ from instrument.record.record import Record
 # Components of uncertainty, and flags of points, as files and reports call them.
 NOISE, ROUNDING, DRIFT = "photon and read noise", "rounding to counts", "lamp drift"
 DARK, PLACEMENT, TEXTURE = "dark frames", "sample placement", "texture at the window edge"
-NO_TILE_YET, NO_SIGNAL = "no white tile yet", "no signal"
+NO_TILE_YET = "no white tile yet"
 TILE_READING, TILE = "white tile reading", "white tile certificate"
 TILE_PLACEMENT = "white tile placement"
+Doubts = Mapping[str, Container[int]]  # steps by flag
 _ANGLES = ("theta_i_deg", "theta_r_deg")
 
 
@@ -130,12 +133,18 @@ def require_usable(reduced: Reduced) -> None:
 
 def reduce(readings: Sequence[Reading], protocol: Protocol, checks: Sequence[Check]) -> Reduced:
     """Return radiance and BRDF of all points; `checks`: the lamp checks made at each resume."""
+    doubtful = doubtful_steps(readings, checks)
+    readings = [r for r in readings if r.kind != "drift" or r.step not in doubtful]
     points = tuple(r for r in readings if r.kind == "point")
     blocks = sorted({r.block for r in readings})
     drifts = {block: Drift.of(readings, block, checks) for block in blocks}
+    doubts = {
+        NO_SIGNAL: unlit_steps(readings),
+        UNPROVEN: doubtful,
+    }
     placements = _placements(sorted(readings, key=lambda r: r.time_s))
     tiles = {
-        r.lamp_setting: _tile(r, drifts[r.block], placements[r.step])
+        r.lamp_setting: _tile(r, drifts[r.block], placements[r.step], doubts)
         for r in readings
         if r.kind == "tile"
     }
@@ -149,9 +158,15 @@ def reduce(readings: Sequence[Reading], protocol: Protocol, checks: Sequence[Che
         radiance=radiance,
         brdf=radiance / white * known,
         components=_components(points),
-        shared=(*_shared(points, placements), *_drift_noise(points, drifts)),
+        shared=(
+            *_shared(points, placements),
+            *_drift_noise(points, drifts),
+            *_drift_between(points, drifts),
+        ),
         shared_by_tile=_shared_by_tile(points, own, protocol),
-        flags=tuple(_flags(p, t, tile is not None) for p, t in zip(points, own, strict=True)),
+        flags=tuple(
+            _flags(p, t, tile is not None, doubts) for p, t in zip(points, own, strict=True)
+        ),
         drift_levels=tuple(drift.level for drift in drifts.values()),
         drift_checks=sum(r.kind == "drift" for r in readings) + sum(c.jumped for c in checks),
     )
@@ -175,7 +190,7 @@ def _relative(points: Sequence[Reading], name: str) -> FloatArray:
     return relative
 
 
-def _tile(reading: Reading, drift: Drift, placement: int) -> _Tile:
+def _tile(reading: Reading, drift: Drift, placement: int, doubts: Doubts) -> _Tile:
     names = ("u_noise_dn", "u_quantisation_dn", "u_texture_dn", "u_dark_dn", "u_placement_dn")
     *own, u_placement = (float(_relative([reading], name)[0]) for name in names)
     return _Tile(
@@ -183,9 +198,7 @@ def _tile(reading: Reading, drift: Drift, placement: int) -> _Tile:
         u_own=float(np.linalg.norm([*own, drift.u_extrapolated(reading.time_s)])),
         u_placement=u_placement,
         placement=placement,
-        flags="; ".join(
-            f for f in (reading.flags, NO_SIGNAL if reading.signal_dn == 0 else "") if f
-        ),
+        flags="; ".join((*_own_flags(reading, doubts), *[NO_SIGNAL] * (reading.signal_dn == 0))),
     )
 
 
@@ -242,6 +255,20 @@ def _drift_noise(points: Sequence[Reading], drifts: Mapping[int, Drift]) -> tupl
     return tuple(SharedError(DRIFT, u, group) for u, group in zip(u_relative, check, strict=True))
 
 
+def _drift_between(
+    points: Sequence[Reading], drifts: Mapping[int, Drift]
+) -> tuple[SharedError, ...]:
+    """Error of a level that may have changed at any moment between two checks; none if steady."""
+    block, time_s = (np.array([getattr(p, n) for p in points]) for n in ("block", "time_s"))
+    u, group = np.zeros(len(points)), np.zeros(len(points), dtype=np.int64)
+    for number, drift in drifts.items():
+        own = np.flatnonzero(block == number)
+        if drift.level.size and own.size:
+            u[own] = drift.u_between(time_s[own])
+            group[own] = drift.interpolation(time_s[own])[0] + 1 + group.max()
+    return (SharedError(DRIFT, u, group),) if u.any() else ()
+
+
 def _shared_by_tile(
     points: Sequence[Reading], tiles: Sequence[_Tile | None], protocol: Protocol
 ) -> tuple[SharedError, ...]:
@@ -266,11 +293,16 @@ def _shared_by_tile(
     )
 
 
-def _flags(point: Reading, tile: _Tile | None, expected: bool) -> str:
+def _own_flags(reading: Reading, doubts: Doubts) -> list[str]:
+    """Return the flags of one reading, and what later readings say against it."""
+    doubtful = [flag for flag, steps in doubts.items() if reading.step in steps]
+    return [flag for flag in (reading.flags, *doubtful) if flag]
+
+
+def _flags(point: Reading, tile: _Tile | None, expected: bool, doubts: Doubts) -> str:
     flags = [
-        point.flags,
+        *_own_flags(point, doubts),
         NO_TILE_YET if tile is None and expected else "",
         f"white tile {tile.flags}" if tile is not None and tile.flags else "",
-        NO_SIGNAL if point.signal_dn == 0 else "",
     ]
     return "; ".join(f for f in flags if f)

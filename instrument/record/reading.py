@@ -54,9 +54,10 @@ class Reading:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """Drift check at a resume; `reading.step` is the drift check of the plan that it repeats.
+    """Drift check at a resume, or one that ended the scan.
 
-    `before_step`: the first step of the plan after it. `expected`: counts per second that earlier
+    `reading.step`: the drift check of the plan that it repeats, or is. `before_step`: the first
+    step of the plan after it. `expected`: counts per second that earlier
     checks predict; `u_expected`: standard uncertainty of the difference from it. `jumped`: the
     lamp's level has changed, so its drift is followed anew from this check on.
     """

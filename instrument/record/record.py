@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import astuple
 from os.path import samestat
@@ -64,6 +64,7 @@ class Record(Closeable):
         self._file = (folder / FILE_NAME).stat()
         self._version = SCHEMA_VERSION
         self._damaged: Damaged = {}
+        self._replaceable: Container[int] = ()
         self._side_files = SideFiles(folder / FILE_NAME)
 
     @classmethod
@@ -170,15 +171,23 @@ class Record(Closeable):
             (reading.step, number, frame.exposure_s, frame.time_s, frame.device_time_s, name)
             for number, (frame, name) in enumerate(zip(frames, names, strict=True))
         ]
+        again = reading.step in self._replaceable
         with self._writing():
-            self._insert("frame", rows)
-            self._insert("reading", [astuple(reading)])
+            self._insert("frame", rows, replace=again)
+            self._insert("reading", [astuple(reading)], replace=again)
             if preview is not None:
                 row = (preview.step, preview.caption, preview.png, json.dumps(preview.polygon))
-                self._insert("preview", [row])
+                self._insert("preview", [row], replace=again)
+
+    def allow_replacing(self, steps: Container[int]) -> None:
+        """Let `add_reading` replace the readings of these steps, each when its successor is there.
+
+        The readings of all other steps stay as they were accepted.
+        """
+        self._replaceable = steps
 
     def add_check(self, check: Check) -> None:
-        """Store the drift check that was made when the scan resumed."""
+        """Store a drift check that was made at a resume, or that ended the scan."""
         head = (check.before_step, check.expected, check.u_expected, check.jumped)
         self._write("drift_at_resume", (*head, *astuple(check.reading)))
 
@@ -202,7 +211,7 @@ class Record(Closeable):
         return [_reading(row) for row in self._rows("reading", "step")]
 
     def checks(self) -> list[Check]:
-        """Return the drift checks that were made at each resume, in order."""
+        """Return the drift checks made at each resume and those that ended the scan, in order."""
         return [
             Check(
                 before_step=before_step,

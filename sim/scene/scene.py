@@ -18,7 +18,6 @@ import numpy as np
 from analysis.accuracy.render_brdf import adequate_brdf
 from analysis.models import MODELS
 from instrument.clock import Clock
-from instrument.config.axes import AXES, HandAxis
 from instrument.config.protocol import PatchConfig, Protocol, Sample, SimulatedSample, WhiteTile
 from instrument.config.rig import Rig
 from instrument.devices import Surface
@@ -69,9 +68,6 @@ class Scene:
             "sample": self.rig.simulation.sample_height_mm,
             "white tile": float(tile_mm),
         }
-        for name in AXES:  # somebody left them there
-            if isinstance(axis := self.rig.axes[name], HandAxis):
-                self.true_deg.setdefault(name, (axis.min_deg + axis.max_deg) / 2)
 
     @classmethod
     def of(cls, rig: Rig, protocol: Protocol) -> Scene:

@@ -1,0 +1,94 @@
+"""References: white tile and drift check show light, and the tile as much as a white surface can.
+
+The tile is white and matt: its reading follows the cosine of the angle of incidence, which tells a
+lamp that stands at another angle than the operator says.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from acquisition.measure.drift import MIN_SIGNAL_U, Drift, rate, u_unknown_trend
+from acquisition.measure.placement import Placement
+from instrument.config.rig import Rig
+from instrument.record.reading import Reading
+
+MOST_WHITE = 10.0
+"""Times the rig file's prediction for a perfect white diffuser: it is an estimate."""
+LAMP_OFF_DEG = 2.0
+"""Lamp angle by which readings of the tile may differ from the cosine law beyond 5 u.
+
+It stands for the tile as well: pressed PTFE reflects some 5 % less than a perfect diffuser at
+theta_i = 60 deg (assumed), as if the lamp stood 1.7 deg further down.
+"""
+_COVERAGE = 5.0
+_NEXT_SETTING = 0.01  # change of the lamp's output when it is moved by hand (assumed)
+
+
+def level_doubt(reading: Reading, rig: Rig) -> str:
+    """Return why a reference is too dark or too bright, empty if it is neither."""
+    name = f"{reading.surface} at theta_i {reading.theta_i_deg:g} deg"
+    if not reading.signal_dn > MIN_SIGNAL_U * reading.u_noise_dn:
+        return (
+            f"{name}: {reading.signal_dn:.3g} DN; expected: {MIN_SIGNAL_U:g} times its noise of "
+            f"{reading.u_noise_dn:.2g} DN or more"
+        )
+    cosine = math.cos(math.radians(reading.theta_i_deg))
+    white_per_s = rig.lamp.white_electrons_per_s * cosine / rig.camera.electrons_per_dn
+    if reading.kind == "tile" and rate(reading) > MOST_WHITE * white_per_s:
+        return (
+            f"{name}: {rate(reading):.3g} DN/s; expected from a white surface: {white_per_s:.3g} "
+            f"DN/s by the rig file's white_electrons_per_s, and not {MOST_WHITE:g} times as much"
+        )
+    return ""
+
+
+def angle_doubt(
+    tile: Reading, others: Sequence[Reading], drifts: Mapping[int, Drift], rig: Rig
+) -> str:
+    """Return why a reading of the tile contradicts an earlier one, empty if it does not.
+
+    `drifts`: of the lamp, by block.
+    """
+    for other in others:
+        if other.flags or not other.signal_dn > 0:
+            continue
+        own = [drifts[r.block] for r in (tile, other)]
+        found, expected = _ratio(tile, other, own), _cosine(tile) / _cosine(other)
+        allowed = math.hypot(_allowed(tile, rig), _allowed(other, rig))
+        allowed += _lamp_change(tile, other, own)
+        if abs(math.log(found / expected)) > allowed:
+            return (
+                f"white tile at theta_i {tile.theta_i_deg:g} deg: {found:.3g} times the light at "
+                f"{other.theta_i_deg:g} deg; expected by the cosine law: {expected:.3g} within "
+                f"{100 * allowed:.2g} %"
+            )
+    return ""
+
+
+def _ratio(tile: Reading, other: Reading, drifts: Sequence[Drift]) -> float:
+    """Return the ratio of two readings, without the drift that checks have seen."""
+    rates = [rate(r) / drift.at(r.time_s) for r, drift in zip((tile, other), drifts, strict=True)]
+    return rates[0] / rates[1]
+
+
+def _cosine(reading: Reading) -> float:
+    return math.cos(math.radians(reading.theta_i_deg))
+
+
+def _allowed(tile: Reading, rig: Rig) -> float:
+    """Return the relative deviation from the cosine law that one reading may have."""
+    u_deg, theta_i_deg = rig.axes.theta_i.u_deg, tile.theta_i_deg
+    off = math.radians(LAMP_OFF_DEG + _COVERAGE * u_deg)
+    u_placement = Placement(rig.u_placement_mm, theta_i_deg, rig.lamp_distance_mm).u_irradiance
+    u = math.hypot(tile.u_noise_dn / tile.signal_dn, u_placement)
+    return math.hypot(off * math.tan(math.radians(theta_i_deg)), _COVERAGE * u)
+
+
+def _lamp_change(tile: Reading, other: Reading, drifts: Sequence[Drift]) -> float:
+    """Return the relative change of the lamp's output that may lie between two readings."""
+    known = [abs(s.trend_per_s) for d in drifts for s in d.segments if s.times_s.size > 1]
+    apart_s = abs(tile.time_s - other.time_s)
+    between = max(known) * apart_s if known else _COVERAGE * u_unknown_trend(apart_s)
+    return between if tile.block == other.block else between + _NEXT_SETTING

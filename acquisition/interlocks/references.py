@@ -1,0 +1,75 @@
+"""References of a scan, judged one by one: each must prove lamp and tile before it is accepted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+from acquisition.interlocks.lamp_checks import check_text, compared, failed
+from acquisition.interlocks.reference_level import angle_doubt, level_doubt
+from acquisition.measure.drift import Drift
+from instrument.config.rig import Rig
+from instrument.record.reading import Check, Reading
+
+_LOOK = {
+    "tile": "look at the lamp, its shutter and its angle, and whether the tile is on the table",
+    "drift": (
+        "look at the lamp and its shutter, let it warm up, and see that the sample is on the table "
+        "and not too dark or too glossy for the view angle of references.drift_check"
+    ),
+}
+
+
+@dataclass(slots=True)
+class References:
+    """Tile readings and drift checks that a scan has accepted, and the checks at each resume."""
+
+    rig: Rig
+    readings: list[Reading] = field(default_factory=list)
+    checks: list[Check] = field(default_factory=list)
+    _unbroken: set[int] = field(default_factory=set)  # steps since the program was started
+
+    def restore(self, readings: Iterable[Reading], checks: Iterable[Check]) -> None:
+        """Take over what a scan has accepted so far."""
+        self.readings, self.checks = list(readings), list(checks)
+
+    def accept(self, reading: Reading) -> None:
+        """Let later references be compared with this one."""
+        self.readings.append(reading)
+        self._unbroken.add(reading.step)
+
+    def doubt(self, reading: Reading) -> str:
+        """Return why a tile reading or drift check cannot be accepted, empty if it can."""
+        if reading.kind == "drift":
+            check = compared(reading, self.readings, self.checks, reading.step)
+            if failed(check):
+                return f"drift check: {check_text(check)}"
+        if level := level_doubt(reading, self.rig):
+            return f"light: {level}"
+        angle = self._angle_doubt(reading)
+        return f"lamp angle: {angle}" if angle else ""
+
+    def failed_check(self, reading: Reading) -> Check | None:
+        """Return the check that makes earlier readings of the block doubtful, None if none is."""
+        if reading.kind == "drift" or self._angle_doubt(reading):
+            check = compared(reading, self.readings, self.checks, reading.step)
+            check = replace(check, jumped=check.jumped and reading.kind == "drift")
+            return check if failed(check) else None
+        return None
+
+    def _angle_doubt(self, reading: Reading) -> str:
+        if reading.kind != "tile" or reading.flags or level_doubt(reading, self.rig):
+            return ""
+        blocks = {r.block for r in (*self.readings, reading)}
+        drifts = {block: Drift.of(self.readings, block, self.checks) for block in blocks}
+        return angle_doubt(reading, self._comparable(reading), drifts, self.rig)
+
+    def _comparable(self, tile: Reading) -> list[Reading]:
+        """Return the readings of the tile by the same lamp, or one that drift checks connect."""
+        tiles = [r for r in self.readings if r.kind == "tile"]
+        return [r for r in tiles if r.block == tile.block or r.step in self._unbroken]
+
+
+def what_to_look_at(reading: Reading) -> str:
+    """Return what may be wrong with a reference that cannot be accepted."""
+    return _LOOK[reading.kind]

@@ -1,0 +1,132 @@
+"""Tile readings: enough light, not more than white gives, and the cosine of the lamp's angle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.interlocks.lamp_checks import UNPROVEN
+from acquisition.interlocks.reference_level import angle_doubt, level_doubt
+from acquisition.measure.drift import Drift
+from acquisition.measure.placement import Placement
+from acquisition.results.reduction import reduce
+from instrument.config.load import Loaded
+from instrument.errors import Interlock
+from instrument.record.reading import Reading
+from instrument.record.record import Record
+from sim.scene.scene import Scene
+from tests.support.lamp_faults import LampFault
+from tests.support.scans import changed, small_scan
+from tests.support.whole_scans.stopped_scan import scan
+
+RIGS = ["bench_12bit", "paper_1995"]
+
+
+def tile(rig_name: str, theta_i_deg: float, factor: float, block: int = 0) -> Reading:
+    """Reading of a tile that gives `factor` times what the rig file lets expect of white."""
+    rig = small_scan(rig_name).rig
+    white = rig.lamp.white_electrons_per_s / rig.camera.electrons_per_dn
+    signal = factor * white * 0.01 * np.cos(np.radians(theta_i_deg))
+    return Reading(
+        step=0, kind="tile", surface="white tile", theta_i_deg=theta_i_deg, dphi_deg=0.0,
+        theta_r_deg=10.0, lamp_setting=0, block=block, signal_dn=float(signal), u_noise_dn=0.1,
+        u_quantisation_dn=0.0, u_dark_dn=0.0, u_placement_dn=0.0, u_texture_dn=0.0,
+        exposure_s=0.01, frames=4, window_pixels=100.0, saturated_pixels=0, peak_dn=1000.0,
+        time_s=60.0 * block, free_s=60.0 * block, time_utc="", flags="",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("rig_name", RIGS)
+@pytest.mark.parametrize(
+    ("factor", "refused"), [(1e-5, True), (0.2, False), (3.0, False), (30.0, True)]
+)
+def test_a_tile_shows_light_and_at_most_what_white_gives(
+    rig_name: str, factor: float, refused: bool
+) -> None:
+    rig = small_scan(rig_name).rig
+    assert bool(level_doubt(tile(rig_name, 45.0, factor), rig)) == refused
+    sample = replace(tile(rig_name, 45.0, factor), kind="drift", surface="sample")
+    assert bool(level_doubt(sample, rig)) == (refused and factor < 1)  # it may be glossy
+
+
+@pytest.mark.parametrize("rig_name", RIGS)
+@pytest.mark.parametrize("seed", range(20))
+def test_tile_readings_follow_the_cosine_within_what_the_rig_file_allows(
+    rig_name: str, seed: int
+) -> None:
+    """Random angles within u, heights within u, a tile of pressed PTFE, a drifting lamp."""
+    random, rig = np.random.default_rng(seed), small_scan(rig_name).rig
+    made = []
+    for block, theta_i in enumerate(random.choice([0.0, 15.0, 30.0, 45.0, 60.0, 70.0], 4, False)):
+        true = np.radians(theta_i + rig.axes.theta_i.u_deg * random.standard_normal())
+        level = np.cos(true) / np.cos(np.radians(theta_i))
+        placement = Placement(rig.u_placement_mm, theta_i, rig.lamp_distance_mm)
+        level *= 1 + placement.u_irradiance * random.standard_normal()
+        level *= 1 - 0.05 * random.uniform() * np.tan(true) / np.tan(np.radians(60.0))
+        made.append(tile(rig_name, float(theta_i), float(level), block))
+    drifts = {block: Drift((), np.nan) for block in range(4)}
+    for n, reading in enumerate(made):
+        assert angle_doubt(reading, made[:n], drifts, rig) == ""
+
+
+@pytest.mark.parametrize("rig_name", RIGS)
+@pytest.mark.parametrize("off_deg", [-5.0, 5.0, 8.0])
+@pytest.mark.parametrize("wrong", [0, 1])
+def test_a_lamp_set_5_degrees_off_at_60_degrees_is_noticed(
+    rig_name: str, off_deg: float, wrong: int
+) -> None:
+    rig, off = small_scan(rig_name).rig, [0.0, 0.0]
+    angles = [60.0, 30.0] if wrong == 0 else [30.0, 60.0]
+    off[wrong] = off_deg
+    made = [
+        tile(rig_name, a, float(np.cos(np.radians(a + o)) / np.cos(np.radians(a))), n)
+        for n, (a, o) in enumerate(zip(angles, off, strict=True))
+    ]
+    drifts = {block: Drift((), np.nan) for block in range(2)}
+    assert angle_doubt(made[1], made[:1], drifts, rig)
+
+
+def test_a_lamp_set_by_hand_at_a_wrong_angle_stops_the_scan_and_all_of_it_is_measured_again(
+    record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second setting's tile is read after its points."""
+    loaded = small_scan("paper_1995")
+    with Record.create(tmp_path / "good", {}) as other:
+        scan(loaded, other)
+        good = reduce(other.readings(), loaded.protocol, ())
+    off, real = {60.0: 5.0}, Scene.set_axis
+
+    def set_axis(scene: Scene, axis: str, angle_deg: float) -> None:
+        real(scene, axis, angle_deg)
+        scene.true_deg[axis] += off.get(angle_deg, 0.0) if axis == "theta_i" else 0.0
+
+    monkeypatch.setattr(Scene, "set_axis", set_axis)
+    with pytest.raises(Interlock, match="interlock lamp angle: white tile at theta_i 60 deg"):
+        scan(loaded, record)
+    found = reduce(record.readings(), loaded.protocol, record.checks())
+    assert {UNPROVEN in f for p, f in zip(found.points, found.flags, strict=True)
+            if p.theta_i_deg == 60.0} == {True}  # fmt: skip
+    assert not any(f for p, f in zip(found.points, found.flags, strict=True) if p.theta_i_deg < 60)
+    off.clear()
+    scan(loaded, record)
+    found = reduce(record.readings(), loaded.protocol, record.checks())
+    assert not any(found.flags)
+    assert found.brdf == pytest.approx(good.brdf, rel=5e-3)
+
+
+def test_a_tile_without_light_stops_the_scan_before_any_point(
+    small: Loaded, record: Record, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    LampFault(level=0.0).install(monkeypatch)
+    with pytest.raises(Interlock, match="interlock light: white tile at theta_i 30 deg"):
+        scan(small, record)
+    assert not record.readings()
+
+
+def test_a_lamp_that_drifts_fast_is_no_wrong_angle(record: Record) -> None:
+    loaded = small_scan("paper_1995")
+    simulation = loaded.rig.simulation.model_copy(update={"lamp_drift_per_hour": -0.1})
+    scan(changed(loaded, rig={"simulation": simulation}), record)
