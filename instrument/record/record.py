@@ -167,11 +167,11 @@ class Record(Closeable):
         name in `files`, relative to the run's folder, if the frame itself is kept.
         """
         names: Sequence[str | None] = files or [None] * len(frames)
+        step, again = reading.step, reading.step in self._replaceable
         rows = [
-            (reading.step, number, frame.exposure_s, frame.time_s, frame.device_time_s, name)
+            (step, number, frame.exposure_s, frame.time_s, frame.device_time_s, name)
             for number, (frame, name) in enumerate(zip(frames, names, strict=True))
         ]
-        again = reading.step in self._replaceable
         with self._writing():
             self._insert("frame", rows, replace=again)
             self._insert("reading", [astuple(reading)], replace=again)
@@ -180,10 +180,7 @@ class Record(Closeable):
                 self._insert("preview", [row], replace=again)
 
     def allow_replacing(self, steps: Container[int]) -> None:
-        """Let `add_reading` replace the readings of these steps, each when its successor is there.
-
-        The readings of all other steps stay as they were accepted.
-        """
+        """Let `add_reading` replace the readings of these steps; all others stay as accepted."""
         self._replaceable = steps
 
     def add_check(self, check: Check) -> None:
