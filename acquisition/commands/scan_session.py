@@ -47,8 +47,8 @@ def scan(loaded: Loaded, plan: Plan, record: Record, progress: Progress | None =
             ended = "" if log.troubles else ": all motion has ended."
             raise OperatorStop(f"{why}{ended} {_how_to_go_on(record, log)}") from None
         except (DeviceError, StorageError) as error:
-            kind = INTERLOCK if isinstance(error, Interlock) else FAULT
-            _record_end(record, log, clock, kind, str(error))
+            for kind in (INTERLOCK, FAULT) if isinstance(error, Interlock) else (FAULT,):
+                _record_end(record, log, clock, kind, str(error))
             rest = _how_to_go_on(record, log, resume=not isinstance(error, WrongRigFile))
             raise type(error)(f"{error}\n{rest}") from error
         except Exception as error:

@@ -189,11 +189,9 @@ class Engine:
             if not failed(check):
                 break
             if attempt + 1 < ATTEMPTS:
-                log.warning("interlock drift check: %s: measured again", check_text(check))
+                log.warning("drift check: %s: measured again", check_text(check))
         if not is_usable(reading):
-            raise Interlock(
-                f"interlock drift check: {check_text(check)}; {what_to_look_at(reading)}"
-            )
+            raise Interlock(f"drift check: {check_text(check)}; {what_to_look_at(reading)}")
         self._record.add_check(check)
         self._add_event(DRIFT, check_text(check))
 
@@ -257,7 +255,7 @@ class Engine:
         reading = self._measure(exposed)
         doubt = self._references.doubt(reading)
         if doubt:
-            log.warning("interlock %s: measured again", doubt)
+            log.warning("%s: measured again", doubt)
             exposed = self._expose(exposed.step)
             reading = self._measure(exposed)
             doubt = self._references.doubt(reading)
@@ -265,7 +263,7 @@ class Engine:
             check = self._references.failed_check(reading)
             if check is not None:
                 self._record.add_check(check)
-            raise Interlock(f"interlock {doubt}; {what_to_look_at(reading)}")
+            raise Interlock(f"{doubt}; {what_to_look_at(reading)}")
         self._references.accept(reading)
         self._commit(exposed, reading)
 

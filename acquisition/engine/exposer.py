@@ -180,11 +180,11 @@ class Exposer:
             return
         darks = self._without_light(exposures_s)
         if (found := self._dark_check.worst(darks, window)) is not None:
-            log.warning("interlock darks: %s: taken again", found.text())
+            log.warning("darks: %s: taken again", found.text())
             self._dark_check.forget_reference()
             darks = self._without_light(exposures_s)
             if (found := self._dark_check.worst(darks, window)) is not None:
-                raise Interlock(f"interlock darks: {found.text()}; {_LOOK_FOR_LIGHT}")
+                raise Interlock(f"darks: {found.text()}; {_LOOK_FOR_LIGHT}")
         for dark in darks:
             self._keep(dark, window)
         self.lamp.light()
@@ -213,7 +213,7 @@ class Exposer:
         """Record a dark, and use it from now on."""
         found = self._dark_check.excess(dark, window)
         if found.light_dn > 0:
-            log.warning("interlock darks: %s: subtracted, and taken as uncertain", found.text())
+            log.warning("darks: %s: subtracted, and taken as uncertain", found.text())
         self._darks[dark.exposure_s] = replace(dark, light_dn=found.light_dn)
         mean, noise = float(dark.mean.mean()), float(np.sqrt(dark.variance.mean()))
         time_utc = self.clock.utc().isoformat()

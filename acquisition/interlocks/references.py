@@ -14,8 +14,9 @@ from instrument.record.reading import Check, Reading
 _LOOK = {
     "tile": "look at the lamp, its shutter and its angle, and whether the tile is on the table",
     "drift": (
-        "look at the lamp and its shutter, let it warm up, and see that the sample is on the table "
-        "and not too dark or too glossy for the view angle of references.drift_check"
+        "look at the lamp and its shutter, let it warm up, and see that neither sample nor camera "
+        "has moved and that the sample is not too dark or too glossy for the view angle of "
+        "references.drift_check"
     ),
 }
 

@@ -168,10 +168,8 @@ class Record(Closeable):
         """
         names: Sequence[str | None] = files or [None] * len(frames)
         step, again = reading.step, reading.step in self._replaceable
-        rows = [
-            (step, number, frame.exposure_s, frame.time_s, frame.device_time_s, name)
-            for number, (frame, name) in enumerate(zip(frames, names, strict=True))
-        ]
+        pairs = enumerate(zip(frames, names, strict=True))
+        rows = [(step, n, f.exposure_s, f.time_s, f.device_time_s, name) for n, (f, name) in pairs]
         with self._writing():
             self._insert("frame", rows, replace=again)
             self._insert("reading", [astuple(reading)], replace=again)
@@ -184,7 +182,7 @@ class Record(Closeable):
         self._replaceable = steps
 
     def add_check(self, check: Check) -> None:
-        """Store a drift check that was made at a resume, or that ended the scan."""
+        """Store a check made at a resume, or one that ended the scan."""
         head = (check.before_step, check.expected, check.u_expected, check.jumped)
         self._write("drift_at_resume", (*head, *astuple(check.reading)))
 

@@ -307,7 +307,7 @@ def test_permission_to_move_is_asked_with_the_reason_of_the_stop_and_recorded(
         said = [text for _, kind, text in record.events() if kind == "resumed"]
     assert len(asked) == 1
     assert "The scan ended with: theta_r: stalled at 12 deg" in asked[0]
-    assert "9 readings are missing. Is the rig clear" in asked[0]
+    assert "9 readings are missing or doubtful. Is the rig clear" in asked[0]
     assert said == [
         "the rig may move: yes, asked at the terminal",
         "the rig may move: --yes",

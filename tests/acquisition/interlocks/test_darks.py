@@ -93,7 +93,7 @@ def test_a_lamp_that_is_not_dark_is_darkened_again_and_then_ends_the_scan(
     rig_name: str, leak: float, record: Record, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fault = LampFault(leak=leak, times_open=2).install(monkeypatch)
-    with pytest.raises(Interlock, match=r"interlock darks: dark at .* DN beside black level"):
+    with pytest.raises(Interlock, match=r"darks: dark at .* DN beside black level"):
         scan(small_scan(rig_name), record, changed_devices=fault.devices)
     assert fault.times_open == 0
     assert not record.darks()
