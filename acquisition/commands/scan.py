@@ -152,8 +152,8 @@ def _confirm(yes: bool, steps: int, record: Record) -> None:
     else:
         last = f"{damage_text(record)}\n" if record.damaged() else ""
         require_yes(
-            f"{ended}{last}{steps} readings are missing or doubtful. Is the rig clear, may the stage "
-            "move?",
+            f"{ended}{last}{steps} readings are missing or doubtful. Is the rig clear, may the "
+            "stage move?",
             "gonio resume: nobody to ask whether the rig may move: add --yes",
             "not resumed: nothing has moved",
         )

@@ -14,8 +14,8 @@ from instrument.config.load import Loaded
 from instrument.errors import Interlock
 from instrument.record.reading import Check, Kind, Reading
 from instrument.record.record import Record
-from tests.support.lamp_faults import LampFault
 from tests.support.scans import changed
+from tests.support.whole_scans.lamp_faults import LampFault
 from tests.support.whole_scans.stopped_scan import scan
 
 NOISE = 2e-4  # relative, of one drift check

@@ -164,12 +164,12 @@ def test_the_limits_are_as_rare_as_six_standard_deviations() -> None:
 def test_a_slip_in_mid_scan_ends_it_and_names_the_step(
     record: Record, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """From the 15th setting of the view angle on, the stage is 5 degrees further than it says."""
+    """From the 17th setting of the view angle on, the stage is 5 degrees further than it says."""
     true, count = Scene.set_axis, [0]
 
     def slipped(scene: Scene, axis: str, angle_deg: float) -> None:
         count[0] += axis == "theta_r"
-        true(scene, axis, angle_deg + 5.0 * (axis == "theta_r" and count[0] > 14))
+        true(scene, axis, angle_deg + 5.0 * (axis == "theta_r" and count[0] > 16))
 
     monkeypatch.setattr(Scene, "set_axis", slipped)
     with pytest.raises(Interlock, match=r"theta_r [-\d.]+ deg puts it .* two frames of step \d+"):

@@ -18,8 +18,8 @@ from instrument.errors import Interlock
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 from sim.scene.scene import Scene
-from tests.support.lamp_faults import LampFault
 from tests.support.scans import changed, small_scan
+from tests.support.whole_scans.lamp_faults import LampFault
 from tests.support.whole_scans.stopped_scan import scan
 
 RIGS = ["bench_12bit", "paper_1995"]
