@@ -1,17 +1,15 @@
-"""Motor whose motions are logged, which brakes on a ramp and moves while it is homing.
+"""Motor whose motions are logged, and which moves while it is homing.
 
 A motion is known in advance, so the log says when the axis stands, however late anybody looks.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from instrument.clock import Clock
+from instrument.kinematics import Braking
 from sim.emulated.motor import Mechanics, Motor
-
-_STEP_S = 1e-4  # over which a speed is taken
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,28 +24,6 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True)
-class Braking:
-    """Way from a signed speed to rest; it can stand in for a `Trapezoid`."""
-
-    speed_deg_per_s: float
-    deceleration_deg_per_s2: float
-
-    @property
-    def duration_s(self) -> float:
-        return abs(self.speed_deg_per_s) / self.deceleration_deg_per_s2
-
-    @property
-    def distance_deg(self) -> float:
-        return self.speed_deg_per_s * self.duration_s / 2
-
-    def travelled_deg(self, time_s: float) -> float:
-        """Return the signed distance in degrees covered `time_s` after the stop."""
-        time_s = min(max(time_s, 0.0), self.duration_s)
-        lost = math.copysign(self.deceleration_deg_per_s2, self.speed_deg_per_s) * time_s**2 / 2
-        return self.speed_deg_per_s * time_s - lost
-
-
-@dataclass(frozen=True, slots=True)
 class Glide:
     """Even motion over a signed distance; it can stand in for a `Trapezoid`."""
 
@@ -57,6 +33,10 @@ class Glide:
     def travelled_deg(self, time_s: float) -> float:
         """Return the signed distance in degrees covered `time_s` after the start."""
         return self.distance_deg * min(max(time_s / self.duration_s, 0.0), 1.0)
+
+    def speed_at(self, time_s: float) -> float:
+        """Return the signed speed in deg/s `time_s` after the start."""
+        return self.distance_deg / self.duration_s if 0 <= time_s < self.duration_s else 0.0
 
 
 class TrueMotor(Motor):
@@ -68,13 +48,6 @@ class TrueMotor(Motor):
         super().__init__(mechanics, clock)
         self._start_deg, self.referenced = start_deg, referenced
         self.motions: list[Motion] = []
-
-    @property
-    def _speed_deg_per_s(self) -> float:
-        since_s = self._clock.now_s() - self._start_s
-        begin_s, end_s = max(since_s - _STEP_S, 0.0), since_s + _STEP_S
-        covered_deg = self._move.travelled_deg(end_s) - self._move.travelled_deg(begin_s)
-        return covered_deg / (end_s - begin_s)
 
     def move(self, angle_deg: float) -> None:
         with self._lock:
@@ -94,12 +67,18 @@ class TrueMotor(Motor):
     def stop(self) -> None:
         with self._lock:
             moved = self.moving
-            way: object = Braking(
-                self._speed_deg_per_s if moved else 0.0, self.mechanics.acceleration_deg_per_s2
-            )
+            speed = self._move.speed_at(self._clock.now_s() - self._start_s)
             self._begin_at_position()
             self._homing_until_s = None
-            self._move = way  # type: ignore[assignment]  # it has what the base class needs
+            self._move = Braking(speed, self.mechanics.acceleration_deg_per_s2)
+            if moved:
+                self._note("brake")
+
+    def halt(self) -> None:
+        with self._lock:
+            moved = self.moving
+            super().halt()
+            self._start_s = self._clock.now_s()
             if moved:
                 self._note("brake")
 
