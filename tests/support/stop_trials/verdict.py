@@ -46,7 +46,7 @@ def verdict(trial: Trial, seen: Seen) -> Verdict:
     if trial.fault in ENDS_NO_PROGRAM:
         wrong += [*_unfinished(seen), *_not_told(trial, seen)]
         return Verdict("finished", tuple(wrong), moved=moved)
-    after_s, braking_s, late_s = _standstill(seen)
+    after_s, braking_s, late_s = _standstill(trial, seen)
     in_time = after_s <= STANDS_WITHIN_S + braking_s + late_s
     if seen.code == 0 and _arrived(seen) and (in_time or not trial.signal):
         return Verdict("ended", tuple(wrong), moved=moved)
@@ -148,13 +148,16 @@ def _arrived(seen: Seen) -> bool:
     return bool(motions) and motions[-1]["kind"] != "brake" and not seen.at_rest["moving"]
 
 
-def _standstill(seen: Seen) -> tuple[float, float, float]:
+def _standstill(trial: Trial, seen: Seen) -> tuple[float, float, float]:
     """Return the time to the standstill, the braking time in it, and the machine's delays."""
     last = seen.at_rest["motions"][-1]
+    begun_s = seen.reachable_s
+    if trial.fault == "frozen" and not trial.signal:  # thawed, it may go on, and be stopped later
+        begun_s = max(begun_s, last["begun_s"] if last["kind"] == "brake" else seen.ended_s)
     whole_s = last["ends_s"] - last["begun_s"]
     braking_s = whole_s if last["kind"] == "brake" else 0.0
     stood_s = last["ends_s"]
-    after_s = max(stood_s - seen.reachable_s, 0.0)
+    after_s = max(stood_s - begun_s, 0.0)
     late = seen.at_end["late"]
     devices_s = sum(s for at_s, s in late if seen.struck_s <= at_s <= stood_s and s > _DELAY_S)
     return after_s, braking_s, devices_s + _waited_s(seen.waits, seen.struck_s, stood_s)
