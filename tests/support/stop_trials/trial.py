@@ -89,7 +89,7 @@ def draw(seed: int) -> Trial:
         at_once=rng.random() < 0.5,
         speed_deg_per_s=speed,
         acceleration_deg_per_s2=speed / rng.uniform(0.05, 0.6),
-        # No faster than a move, as controllers look for a reference; before a move it is not judged.
+        # No faster than a move, as controllers look for a reference; before a move not judged.
         homing_s=max(rng.uniform(0.8, 3.0), abs(start) / speed) if motion == "homing" else 0.2,
         start_deg=start,
         target_deg=target,

@@ -150,17 +150,20 @@ def _arrived(seen: Seen) -> bool:
 
 def _standstill(trial: Trial, seen: Seen) -> tuple[float, float, float]:
     """Return the time to the standstill, the braking time in it, and the machine's delays."""
-    last = seen.at_rest["motions"][-1]
+    motions = seen.at_rest["motions"]
+    stood_s = motions[-1]["ends_s"]
+    brakes_s = stood_s  # from when on: a stop that is sent again goes on braking
+    for motion in reversed(motions):
+        if motion["kind"] != "brake":
+            break
+        brakes_s = motion["begun_s"]
     begun_s = seen.reachable_s
     if trial.fault == "frozen" and not trial.signal:  # thawed, it may go on, and be stopped later
-        begun_s = max(begun_s, last["begun_s"] if last["kind"] == "brake" else seen.ended_s)
-    whole_s = last["ends_s"] - last["begun_s"]
-    braking_s = whole_s if last["kind"] == "brake" else 0.0
-    stood_s = last["ends_s"]
-    after_s = max(stood_s - begun_s, 0.0)
+        begun_s = max(begun_s, min(brakes_s, seen.ended_s))
     late = seen.at_end["late"]
     devices_s = sum(s for at_s, s in late if seen.struck_s <= at_s <= stood_s and s > _DELAY_S)
-    return after_s, braking_s, devices_s + _waited_s(seen.waits, seen.struck_s, stood_s)
+    late_s = devices_s + _waited_s(seen.waits, seen.struck_s, stood_s)
+    return max(stood_s - begun_s, 0.0), stood_s - brakes_s, late_s
 
 
 def _moved(seen: Seen) -> bool:
