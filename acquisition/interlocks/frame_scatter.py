@@ -87,13 +87,11 @@ def frame_scatter(
 
 def _deviations_dn(frames: Sequence[Frame], window: Window) -> FloatArray:
     """Return the deviation of each frame's window mean from the mean of all, (frames,) in DN."""
-    import cv2
-
-    first = frames[0].image[window.crop]
+    first = frames[0].image[window.crop].astype(np.float32)
     weights = window.weights.astype(np.float32)
-    means = [0.0]
-    for frame in frames[1:]:
-        change = cv2.subtract(frame.image[window.crop], first, dtype=cv2.CV_32F)
+    means, change = [0.0], np.empty_like(first)
+    for frame in frames[1:]:  # differences of counts are exact in single precision
+        np.subtract(frame.image[window.crop], first, out=change)
         means.append(float(np.vdot(weights, change)))
     deviations: FloatArray = np.array(means) - np.mean(means)
     return deviations

@@ -46,22 +46,28 @@ class Traits:
     """Properties of the camera, measured when it was first opened.
 
     `period_s`: its shortest frame period. `monotonic`: its time stamps are of the monotonic clock.
-    `reports_torn_frames`: the states of its buffers show bad frames. `notes`: controls that could
-    not be made neutral, in words.
+    `reports_torn_frames`: the states of its buffers show bad frames. `counts_frames`: its driver
+    numbers them. `notes`: controls that could not be made neutral, in words.
     """
 
     period_s: float
     monotonic: bool
     reports_torn_frames: bool
+    counts_frames: bool
     notes: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """A frame that has been taken: its time stamp, and its fault in words, if any."""
+    """A frame that has been taken: its time stamp, its fault in words, if any, and its number.
+
+    `sequence`: from 0 at each start of the stream; larger by more than 1 after frames that were
+    dropped; None if the buffer's state is not known.
+    """
 
     stamp_s: float
     fault: str = ""
+    sequence: int | None = None
 
 
 class Capture:
@@ -98,11 +104,12 @@ class Capture:
         self.set_exposure(exposure_steps)
         if settings.gain is not None:
             self._controls.set(GAIN, settings.gain)
+        self._controls.note_others()
         self._buffers, self._next_buffer = buffer_count(self._video), 0
 
     @property
     def settings(self) -> dict[str, str]:
-        """Every control that was set, as read back."""
+        """Every control that was set, as read back, and the others as found."""
         return dict(self._controls.read_back)
 
     def close(self) -> None:
@@ -146,7 +153,10 @@ class Capture:
         measured_s = float(np.min(periods)) if monotonic else 0.0
         reports_torn_frames = self.can_query_buffers and shows_state
         period_s = max(stated_s, measured_s)
-        return Traits(period_s, monotonic, reports_torn_frames, tuple(self._notes))
+        numbers = [one.sequence for one in arrivals if one.sequence is not None]
+        counts_frames = len(set(numbers)) == len(numbers) > 1
+        notes = tuple(self._notes)
+        return Traits(period_s, monotonic, reports_torn_frames, counts_frames, notes)
 
     def next(self, heartbeat: Heartbeat, patience_s: float) -> Arrival:
         """Take the next frame out of the queue, old or new; raise if the camera is silent."""
@@ -203,7 +213,7 @@ class Capture:
         for buffer in filled:
             if abs(buffer.time_s - stamp_s) < _SAME_STAMP_S:
                 self._next_buffer = (buffer.index + 1) % self._buffers
-                return Arrival(stamp_s, _fault(buffer, needed))
+                return Arrival(stamp_s, _fault(buffer, needed), buffer.sequence)
         return Arrival(stamp_s, _NO_STATE if self.requires_buffer_state else "")
 
     def image(self) -> Image | None:

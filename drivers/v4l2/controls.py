@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 
 from drivers.v4l2 import ioctl
-from instrument.errors import DeviceError
+from instrument.errors import DeviceError, Interlock
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +44,21 @@ class Controls:
 
     def __init__(self, descriptor: int, who: str) -> None:
         self._descriptor, self._who = descriptor, who
-        self._standing: dict[LabelledControl, int] = {}
+        self._standing: dict[LabelledControl, int] = {}  # those that were set
+        self._found: dict[LabelledControl, int] = {}  # the others
 
     @property
     def read_back(self) -> dict[str, str]:
-        """Each control that was set, as the camera reported it afterwards."""
-        return {control.label: control.text(value) for control, value in self._standing.items()}
+        """Each control, as the camera reported it after it was set, or when it was opened."""
+        known = self._found | self._standing
+        return {control.label: control.text(value) for control, value in known.items()}
+
+    def note_others(self) -> None:
+        """Read every control that was not set and that the camera does not change by itself."""
+        numbers = {control.number for control in self._standing}
+        for other in ioctl.controls(self._descriptor):
+            if other.steady and other.value is not None and other.number not in numbers:
+                self._found[LabelledControl(other.number, other.name.lower())] = other.value
 
     def disable_automatic(self) -> list[str]:
         """Switch off every automatic control that would change the counts.
@@ -108,15 +118,24 @@ class Controls:
         return read_back
 
     def require_unchanged(self) -> None:
-        """Raise if a control no longer has the value that was read back when it was set."""
-        for control, value in self._standing.items():
+        """Raise `Interlock` if a control no longer has the value that was read back before.
+
+        It is set back first: a scan that is resumed finds it as it was. Of a USB camera Linux
+        answers from its memory, save for the few controls that the camera may change by itself.
+        """
+        for control, value in (self._standing | self._found).items():
             found = self._read(control)
-            if found != value:
-                raise DeviceError(
-                    f"{self._who}: {control.label} is {control.text(found)}, but "
-                    f"{control.text(value)} was set: another program changes the camera; close it "
-                    "(v4l2-ctl, guvcview, a browser); the frames taken meanwhile are not used"
-                )
+            if found == value:
+                continue
+            with suppress(OSError):
+                ioctl.set_control(self._descriptor, control.number, value)
+            since = "was set" if control in self._standing else "when the camera was opened"
+            raise Interlock(
+                f"camera settings: {self._who}: {control.label} is {control.text(found)}, but "
+                f"{control.text(value)} {since}: another program changes the camera; close it "
+                "(v4l2-ctl, guvcview, a browser; fuser -v with the camera's path lists them); the "
+                f"frames taken meanwhile are not used, and {control.text(value)} was set again"
+            )
 
     def _write(self, control: LabelledControl, value: int) -> int:
         """Set a control within the camera's range and return the value read back."""

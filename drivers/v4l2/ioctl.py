@@ -92,6 +92,8 @@ KINDS = {
 }
 _BIG_ENDIAN, _BIG_ENDIAN_TEXT, _HEX_LETTERS = 1 << 31, "-BE", len("0x12345678")
 _NEXT, _DISABLED, _WITHOUT_VALUE = 0x80000000, 0x1, (4, 5, 6, 7)
+# V4L2_CTRL_FLAG_READ_ONLY, _INACTIVE (another control decides), _WRITE_ONLY, _VOLATILE
+_UNSTEADY = 0x4 | 0x10 | 0x40 | 0x80
 _MAX_ENTRIES = 256  # a driver that never refuses an index must not cause an endless loop
 
 
@@ -157,7 +159,10 @@ class Format:
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """A control, its range as in the structure, and its value; None if it cannot be read."""
+    """A control, its range as in the structure, and its value; None if it cannot be read.
+
+    `steady`: the device never changes it by itself.
+    """
 
     number: int
     name: str
@@ -167,6 +172,7 @@ class Control:
     step: int
     default: int
     value: int | None = None
+    steady: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,7 +273,8 @@ def control(descriptor: int, number: int) -> Control | None:
         return None
     value = None if kind in _WITHOUT_VALUE else _value_or_none(descriptor, found)
     label = KINDS.get(kind, str(kind))
-    return Control(found, text(name), label, minimum, maximum, step, default, value)
+    steady = not flags & _UNSTEADY
+    return Control(found, text(name), label, minimum, maximum, step, default, value, steady)
 
 
 def _value_or_none(descriptor: int, number: int) -> int | None:

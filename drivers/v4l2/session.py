@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import replace
 
-from drivers.v4l2.capture import PATIENCE_S, Capture, Traits
+from drivers.v4l2.capture import PATIENCE_S, Arrival, Capture, Traits
 from drivers.v4l2.frame_filter import FrameFilter
 from drivers.v4l2.settings import BUFFERS, V4l2Settings
 from drivers.v4l2.worker_thread import Heartbeat
@@ -56,8 +56,10 @@ class Session:
 
     @property
     def settings(self) -> dict[str, str]:
-        """The controls as read back, and the frame period."""
-        return {**self._capture.settings, "frame period": f"{self.traits.period_s:g} s"}
+        """The controls as read back, the frame period, and who numbers the frames."""
+        numbers = "by the driver" if self.traits.counts_frames else "none"
+        own = {"frame period": f"{self.traits.period_s:g} s", "frame numbers": numbers}
+        return {**self._capture.settings, **own}
 
     @property
     def exposure_s(self) -> float:
@@ -84,7 +86,7 @@ class Session:
     def take(self, heartbeat: Heartbeat, count: int, requested_s: float) -> list[Frame]:
         """Take `count` good frames whose exposure began after `requested_s`.
 
-        Raises `DeviceError` if another program has changed a control meanwhile.
+        Raises `Interlock` if another program has changed a control meanwhile.
         """
         self._filter.request(requested_s)
         frames: list[Frame] = []
@@ -93,7 +95,7 @@ class Session:
             arrival = self._capture.next(heartbeat, self.longest_frame_s + PATIENCE_S)
             if not self._filter.accepts(arrival.stamp_s):
                 continue
-            frame, fault = self._frame(arrival.stamp_s, arrival.fault)
+            frame, fault = self._frame(arrival)
             if frame is None:
                 bad += 1
                 if bad > MAX_BAD_FRAMES:
@@ -105,11 +107,12 @@ class Session:
         self._capture.require_unchanged()
         return frames
 
-    def _frame(self, stamp_s: float, fault: str) -> tuple[Frame | None, str]:
+    def _frame(self, arrival: Arrival) -> tuple[Frame | None, str]:
         """Return the frame taken last, or what is wrong with it."""
-        image = None if fault else self._capture.image()
+        image = None if arrival.fault else self._capture.image()
         if image is None:
-            return None, fault or "was of another size"
+            return None, arrival.fault or "was of another size"
         self._capture.check_counts(image)
-        device_time_s = stamp_s if self.traits.monotonic else None
-        return Frame(image, self.exposure_s, self._clock.now_s(), device_time_s), ""
+        device_time_s = arrival.stamp_s if self.traits.monotonic else None
+        sequence = arrival.sequence if self.traits.counts_frames else None
+        return Frame(image, self.exposure_s, self._clock.now_s(), device_time_s, sequence), ""

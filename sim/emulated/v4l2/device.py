@@ -88,10 +88,14 @@ class Capabilities:
 
 @dataclass(slots=True)
 class CameraFaults:
-    """Present faults of the camera; a test sets and clears them while the camera runs."""
+    """Present faults of the camera; a test sets and clears them while the camera runs.
+
+    repeats: hands out the last frame over and over, with its number.
+    """
 
     unplugged: bool = False
     frozen: bool = False
+    repeats: bool = False
     gives_no_buffers: bool = False
     clamped_exposure: int | None = None  # in 100 µs
     substitute_format: PixelFormat | None = None

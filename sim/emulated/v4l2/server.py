@@ -22,6 +22,7 @@ _PROGRESSIVE, _SRGB = 1, 8  # V4L2_FIELD_NONE, V4L2_COLORSPACE_SRGB
 _EXTENDED = 0xFEEDCAFE  # V4L2_PIX_FMT_PRIV_MAGIC
 _TIME_PER_FRAME = 0x1000  # V4L2_CAP_TIMEPERFRAME
 _NEXT = 0x80000000
+_VOLATILE = 0x80  # V4L2_CTRL_FLAG_VOLATILE
 _KIND_NUMBERS = {name: number for number, name in reversed(ioctl.KINDS.items())}
 
 
@@ -222,7 +223,8 @@ class _Descriptor:
         control = controls[number]
         limits = (control.minimum, control.maximum, control.step, control.default)
         kind = _KIND_NUMBERS[control.kind]
-        return ioctl.QUERYCTRL_STRUCT.pack(number, kind, control.name.encode(), *limits, 0)
+        flags = 0 if control.steady else _VOLATILE
+        return ioctl.QUERYCTRL_STRUCT.pack(number, kind, control.name.encode(), *limits, flags)
 
     def _set_input(self, argument: bytes) -> bytes:
         _require(argument == bytes(4))

@@ -1,4 +1,8 @@
-"""Video stream of one open descriptor: its buffers, which a free-running sensor fills."""
+"""Video stream of one open descriptor: its buffers, which a free-running sensor fills.
+
+Frames are numbered as by uvcvideo and vivid of Linux: from 0 at each start of the stream, also
+those for which no buffer was free, so that a lost frame is a gap.
+"""
 
 from __future__ import annotations
 
@@ -47,6 +51,7 @@ class Stream:
         self._queued: deque[int] = deque()
         self._done: deque[int] = deque()
         self._length = 0
+        self._last: tuple[Exposure, object] | None = None
         self._sensor = FreeRunningSensor(camera, self._read_out)
         self._lock = threading.Lock()
         self._closed = False
@@ -175,7 +180,9 @@ class Stream:
             buffer.state = ioctl.BUFFER_DONE
             buffer.bytes_used = self._camera.format().bytes_total
             buffer.time_s = end_s + self._camera.capabilities.stamp_offset_s
-            buffer.sequence, buffer.frame = exposure.sequence, (exposure, snapshot)
+            if not (faults.repeats and self._last):
+                self._last = (exposure, snapshot)
+            buffer.sequence, buffer.frame = self._last[0].sequence, self._last
             bad = faults.bad_frames.popleft() if faults.bad_frames else None
             buffer.bad = bad == "flagged"
             if bad == "short":

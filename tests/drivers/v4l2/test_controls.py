@@ -8,7 +8,7 @@ import pytest
 
 from drivers.v4l2 import ioctl
 from instrument.config.camera import CameraDefects
-from instrument.errors import DeviceError
+from instrument.errors import DeviceError, Interlock
 from sim.emulated.v4l2.device import BRIGHTNESS
 from tests.support.v4l2.remote_camera import (
     SETTINGS,
@@ -90,6 +90,8 @@ def test_an_exposure_that_the_camera_rounds_is_used_as_it_was_read_back(
         (ioctl.EXPOSURE_ABSOLUTE, 77, "exposure is 0.0077 s, but 0.001 s was set"),
         (ioctl.GAIN, 200, "gain is 200, but 100 was set"),
         (ioctl.EXPOSURE_AUTO, 3, "manual exposure, which is mode is 3, but 1 was set"),
+        (ioctl.AUTO_WHITE_BALANCE, 1, "automatic white balance is 1, but 0 was set"),
+        (BRIGHTNESS, 12, "brightness is 12, but 128 when the camera was opened"),
     ],
 )
 def test_a_change_by_another_program_is_noticed(
@@ -99,9 +101,46 @@ def test_a_change_by_another_program_is_noticed(
         remote.ask("open", SETTINGS)
         remote.grab(1)
         camera.set_value(number, value)
-        with pytest.raises(DeviceError, match=f"{WHO}: {message}: another program changes the"):
+        with pytest.raises(Interlock, match=f"^camera settings: {WHO}: {message}: another prog"):
             remote.grab(2)
+        assert camera.value(number) != value  # it was set back
         assert steps(remote.grab(1)[0]) == 10  # the camera has been set again
+
+
+def test_a_gain_that_the_rig_file_does_not_name_is_watched_too(
+    remote: RemoteCamera, scene: LevelScene
+) -> None:
+    with served(remote, scene) as camera:
+        remote.ask("open", replace(SETTINGS, gain=None))
+        assert remote.ask("settings")["gain"] == "100"
+        remote.grab(1)
+        camera.set_value(ioctl.GAIN, 150)
+        with pytest.raises(Interlock, match=r"gain is 150, but 100 when .* and 100 was set again"):
+            remote.grab(2)
+        remote.grab(2)
+        assert camera.gain == 100
+
+
+def test_a_control_that_the_camera_changes_by_itself_is_left_alone(
+    remote: RemoteCamera, scene: LevelScene
+) -> None:
+    with served(remote, scene) as camera:
+        found = camera._controls[BRIGHTNESS]
+        camera._controls[BRIGHTNESS] = replace(found, steady=False)
+        remote.ask("open", SETTINGS)
+        remote.grab(1)
+        camera.set_value(BRIGHTNESS, 12)
+        assert len(remote.grab(2)) == 2
+        assert "brightness" not in remote.ask("settings")
+
+
+def test_controls_are_read_once_a_series(remote: RemoteCamera, scene: LevelScene) -> None:
+    with served(remote, scene) as camera:
+        remote.ask("open", SETTINGS)
+        before = camera.requests["G_CTRL"]
+        remote.grab(8)
+        remote.ask("settings")
+        assert camera.requests["G_CTRL"] - before == len(camera.controls())
 
 
 def test_a_missing_gain_control_is_an_error(remote: RemoteCamera, scene: LevelScene) -> None:
