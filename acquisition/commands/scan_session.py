@@ -28,6 +28,7 @@ _TO_BE_SEEN = (
     "acquisition.engine.exposure_check",
     "acquisition.engine.resume",
 )
+_LAST_WRITES_S = 5.0  # for a disk that hangs, or another program that holds the record
 
 
 def scan(loaded: Loaded, plan: Plan, record: Record, progress: Progress | None = None) -> None:
@@ -90,6 +91,7 @@ def _run(
 
 def _record_end(record: Record, log: EventLogHandler, clock: Clock, kind: str, why: str) -> None:
     """Record why a scan ended, unless the disk fails: the error message says it as well."""
+    record.writing.give_up_within(_LAST_WRITES_S)
     try:
         log.write()
         record.add_event(clock.utc().isoformat(), kind, why)
@@ -105,9 +107,16 @@ def _how_to_go_on(record: Record, log: EventLogHandler, *, resume: bool = True) 
     folder = record.current_folder()
     if folder is None:
         return f"{_warnings(log)}The run's folder is gone: nothing is left to resume"
-    safe = f"{len(record.readings())} readings are safe in {folder}"
+    safe = f"{_safe_readings(record)} in {folder}"
     new_run = "Correct the rig file, then start a new run"
     return f"{_warnings(log)}{safe}. {f'Go on with: gonio resume {folder}' if resume else new_run}"
+
+
+def _safe_readings(record: Record) -> str:
+    try:
+        return f"{len(record.readings())} readings are safe"
+    except StorageError as error:
+        return f"{error}. Every other accepted reading is safe"
 
 
 def _warnings(log: EventLogHandler) -> str:

@@ -1,8 +1,9 @@
 """Engine of a scan: move, settle, expose; reduce and record while the next move is under way.
 
 Devices are known only by their interfaces. Every reading is on disk before the next move counts as
-done. However a scan ends, motion is stopped and the lamp darkened, and this process moves nothing
-again: only the operator may resume the scan.
+done, and is written by a thread of the record: a disk that hangs holds up no motion and no stop.
+However a scan ends, motion is stopped and the lamp darkened, and this process moves nothing again:
+only the operator may resume the scan.
 """
 
 from __future__ import annotations
@@ -214,8 +215,9 @@ class Engine:
                 self._place(step.surface)
             moves = plan.moves_to(step, self._positioner.pose, self._rig)
             self._positioner.start_moves(moves, step.pose)
-            self._accept(waiting)
+            self._begin_accepting(waiting)
             self._positioner.finish_moves()
+            self._finish_accepting(waiting)
             waiting = self._expose(step)
             if step.kind != "point":
                 self._accept_reference(waiting)
@@ -265,23 +267,37 @@ class Engine:
                 self._record.add_check(check)
             raise Interlock(f"{doubt}; {what_to_look_at(reading)}")
         self._references.accept(reading)
-        self._commit(exposed, reading)
+        self._begin_commit(exposed, reading)
+        self._finish_accepting(exposed)
 
     def _accept(self, exposed: Exposed | None) -> None:
         """Reduce the frames of a point and commit them to the record."""
-        if exposed is not None:
-            self._commit(exposed, self._measure(exposed))
+        self._begin_accepting(exposed)
+        self._finish_accepting(exposed)
 
-    def _commit(self, exposed: Exposed, reading: Reading) -> None:
-        step = exposed.step
-        preview, files = None, list[str]()
+    def _begin_accepting(self, exposed: Exposed | None) -> None:
+        """Reduce the frames of a point, whose commit goes on while a move is watched from here."""
+        if exposed is not None:
+            self._begin_commit(exposed, self._measure(exposed))
+
+    def _finish_accepting(self, exposed: Exposed | None) -> None:
+        """Wait until the disk has what was begun."""
+        if exposed is not None:
+            self._record.writing.wait()
+            self._on_step(exposed.step)
+
+    def _begin_commit(self, exposed: Exposed, reading: Reading) -> None:
+        step, record, preview = exposed.step, self._record, None
         if step.preview:
             preview = make_preview(exposed, self._window(step.pose), self._rig.camera.max_dn)
-        if self._protocol.keep_frames:
-            files = write_frames(exposed.frames, step.index, self._record.folder)
-        self._record.add_reading(reading, preview, exposed.frames, files)
+
+        def write() -> None:
+            keeps = self._protocol.keep_frames
+            files = write_frames(exposed.frames, step.index, record.folder) if keeps else []
+            record.add_reading(reading, preview, exposed.frames, files)
+
+        record.writing.begin(write)
         self._exposer.note_brightness(reading)
-        self._on_step(step)
 
     def _measure(self, exposed: Exposed) -> Reading:
         window, least = self._window(exposed.step.pose), self._protocol.window.min_pixels

@@ -27,22 +27,23 @@ from instrument.record.database_files import (
     remove_database,
 )
 from instrument.record.folder_lock import FolderLock
-from instrument.record.network_share import network_share
 from instrument.record.reading import Check, Preview, Reading
 from instrument.record.schema import (
-    LEAST_SQLITE,
     SCHEMA_VERSION,
     TABLES,
     connect,
     create_tables,
     has_seals,
+    require_support,
 )
 from instrument.record.seal import Damaged, sealed, storable
 from instrument.record.validation import check_files, check_schema, check_values
 from instrument.record.write_lock import begin_writing, held_by_another, is_busy
+from instrument.record.write_thread import WriteThread
 from instrument.text.atomic_file import disk_full, explain_os_error, make_folder, sync_folder
 
 FILE_NAME = "record.sqlite"
+Rows = Sequence[Sequence[object]]
 _NAMES = {table: [c.name for c in columns] for table, columns in TABLES.items()}
 _SAVED = "the accepted readings have been moved into the database and are safe"
 _LOST = "the latest readings, which only it held, are lost and have to be measured again"
@@ -53,6 +54,7 @@ _NOT_PERMITTED = ("SQLITE_READONLY", "SQLITE_PERM", "SQLITE_CANTOPEN")
 class Record(Closeable):
     """Open record; use it with `with`. Every `add_...` is on disk when it returns.
 
+    `writing` is the thread that writes, for a caller who has something else to do meanwhile.
     Rows that were damaged since they were written are left out of everything that it returns.
     """
 
@@ -66,6 +68,7 @@ class Record(Closeable):
         self._damaged: Damaged = {}
         self._replaceable: Container[int] = ()
         self._side_files = SideFiles(folder / FILE_NAME)
+        self.writing = WriteThread(folder / FILE_NAME)
 
     @classmethod
     def create(cls, folder: Path, meta: Mapping[str, str]) -> Record:
@@ -73,7 +76,7 @@ class Record(Closeable):
 
         The folder is locked against a second scan until the record is closed, or `claimed` ends.
         """
-        _require_support(folder)
+        require_support(folder)
         with ExitStack() as on_failure:
             try:
                 record = cls(*_created(folder, meta, on_failure))
@@ -90,7 +93,7 @@ class Record(Closeable):
         `claim`: lock the folder against a second scan, before anything is read and until the record
         is closed; `InputError` names the process that holds the lock.
         """
-        _require_support(folder)
+        require_support(folder)
         path = folder / FILE_NAME
         if not path.is_file():
             raise InputError(f"{folder}: {_no_run(folder)}")
@@ -118,7 +121,8 @@ class Record(Closeable):
 
     def close(self) -> None:
         """Close the file and release the lock; may be called twice."""
-        self._db.close()
+        if self.writing.end():
+            self._db.close()
         if self._lock is not None:
             self._lock.close()
 
@@ -133,26 +137,26 @@ class Record(Closeable):
 
     def set_meta(self, key: str, value: str) -> None:
         """Set one entry of the run's description."""
-        self._write("meta", (key, value), replace=True)
+        self._write({"meta": [(key, value)]}, replace=True)
 
     def add_device(self, role: str, identity: str) -> None:
         """Store the identity that a device gave; `role` is its place on the rig."""
-        self._write("device", (role, identity), replace=True)
+        self._write({"device": [(role, identity)]}, replace=True)
 
     def add_settings(self, time_utc: str, role: str, settings: Mapping[str, str]) -> None:
         """Store a device's settings by name, units in the names."""
         rows = [(None, time_utc, role, *setting) for setting in settings.items()]
-        self._write("setting", *rows)
+        self._write({"setting": rows})
 
     def add_event(self, time_utc: str, kind: str, text: str) -> None:
         """Store an event; `kind` is one of `event_kinds`."""
-        self._write("event", (None, time_utc, kind, text))
+        self._write({"event": [(None, time_utc, kind, text)]})
 
     def add_dark(
         self, time_utc: str, exposure_s: float, frames: int, mean_dn: float, noise_dn: float
     ) -> None:
         """Store a dark measurement: mean count and temporal noise of one pixel, in DN."""
-        self._write("dark", (None, time_utc, exposure_s, frames, mean_dn, noise_dn))
+        self._write({"dark": [(None, time_utc, exposure_s, frames, mean_dn, noise_dn)]})
 
     def add_reading(
         self,
@@ -170,12 +174,11 @@ class Record(Closeable):
         step, again = reading.step, reading.step in self._replaceable
         pairs = enumerate(zip(frames, names, strict=True))
         rows = [(step, n, f.exposure_s, f.time_s, f.device_time_s, name) for n, (f, name) in pairs]
-        with self._writing():
-            self._insert("frame", rows, replace=again)
-            self._insert("reading", [astuple(reading)], replace=again)
-            if preview is not None:
-                row = (preview.step, preview.caption, preview.png, json.dumps(preview.polygon))
-                self._insert("preview", [row], replace=again)
+        tables: dict[str, Rows] = {"frame": rows, "reading": [astuple(reading)]}
+        if preview is not None:
+            row = (preview.step, preview.caption, preview.png, json.dumps(preview.polygon))
+            tables["preview"] = [row]
+        self._write(tables, replace=again)
 
     def allow_replacing(self, steps: Container[int]) -> None:
         """Let `add_reading` replace the readings of these steps; all others stay as accepted."""
@@ -184,7 +187,7 @@ class Record(Closeable):
     def add_check(self, check: Check) -> None:
         """Store a check made at a resume, or one that ended the scan."""
         head = (check.before_step, check.expected, check.u_expected, check.jumped)
-        self._write("drift_at_resume", (*head, *astuple(check.reading)))
+        self._write({"drift_at_resume": [(*head, *astuple(check.reading))]})
 
     def damaged(self) -> tuple[str, ...]:
         """Return the rows that were damaged since they were written: `reading 5`, `event 2`."""
@@ -192,14 +195,17 @@ class Record(Closeable):
 
     def remove_damaged(self) -> None:
         """Remove the damaged rows, and what belongs to a reading that is no longer there."""
-        with self._writing() as database:
+        self.writing.run(self._delete_damaged)
+        self._damaged = {}
+
+    def _delete_damaged(self) -> None:
+        with self._transaction() as database:
             for table, rows in self._damaged.items():
                 database.executemany(f"DELETE FROM {table} WHERE rowid = ?", [(r,) for r in rows])
             for table in ("frame", "preview"):
                 orphans = "step NOT IN (SELECT step FROM reading)"
                 database.execute(f"DELETE FROM {table} NOT INDEXED WHERE {orphans}")
             database.execute("REINDEX")
-        self._damaged = {}
 
     def readings(self) -> list[Reading]:
         """Return all measured geometries in the plan's order."""
@@ -249,19 +255,24 @@ class Record(Closeable):
 
     def _rows(self, table: str, order: str = "rowid") -> Iterator[tuple[Any, ...]]:
         """Yield the undamaged rows of a table, read from it and not from an index."""
+        self.writing.wait()
         left_out = ", ".join(map(str, self._damaged.get(table, ())))
         yield from self._db.execute(
             f"SELECT {', '.join(_NAMES[table])} FROM {table} NOT INDEXED "
             f"WHERE rowid NOT IN ({left_out}) ORDER BY {order}"
         )
 
-    def _write(self, table: str, *rows: Sequence[object], replace: bool = False) -> None:
-        with self._writing():
-            self._insert(table, rows, replace=replace)
+    def _write(self, tables: Mapping[str, Rows], *, replace: bool = False) -> None:
+        """Insert rows into tables in one transaction."""
 
-    def _insert(
-        self, table: str, rows: Iterable[Sequence[object]], *, replace: bool = False
-    ) -> None:
+        def write() -> None:
+            with self._transaction():
+                for table, rows in tables.items():
+                    self._insert(table, rows, replace=replace)
+
+        self.writing.run(write)
+
+    def _insert(self, table: str, rows: Rows, *, replace: bool) -> None:
         """Insert rows in the transaction that is open, sealed if the record's version has seals."""
         seals = has_seals(self._version)
         marks = ", ".join("?" * (len(_NAMES[table]) + seals))
@@ -271,7 +282,7 @@ class Record(Closeable):
         self._db.executemany(sql, whole)
 
     @contextmanager
-    def _writing(self) -> Iterator[sqlite3.Connection]:
+    def _transaction(self) -> Iterator[sqlite3.Connection]:
         """One transaction; `StorageError` if the disk does not accept it, or it is not free."""
         self._require_same_files()
         path = self.folder / FILE_NAME
@@ -376,21 +387,6 @@ def _no_run(path: Path) -> str:
     if path.is_file():
         return "is a file; name the folder of a run"
     return f"no {FILE_NAME} there: name the folder of a run"
-
-
-def _require_support(folder: Path) -> None:
-    """Refuse a Python with an old SQLite, and a folder on a network share."""
-    if sqlite3.sqlite_version_info < LEAST_SQLITE:
-        raise InputError(
-            f"{folder}: SQLite {sqlite3.sqlite_version} of this Python cannot hold a record; "
-            f"needed: {'.'.join(map(str, LEAST_SQLITE))} or later: use another Python"
-        )
-    share = network_share(folder)
-    if share is not None:
-        raise InputError(
-            f"{folder}: is on a network share ({share}), where the record is not safe: name a "
-            "folder on a local disk, and copy the run afterwards"
-        )
 
 
 def _reading(row: Iterable[Any]) -> Reading:

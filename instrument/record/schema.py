@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import NamedTuple, get_args
 
 from instrument.devices import Surface
+from instrument.errors import InputError
 from instrument.record.reading import Kind
 from instrument.record.write_lock import TRY_S
+from instrument.text.network_share import network_share
 
 SCHEMA_VERSION = 5
 FIRST_STRICT, _FIRST_SEALED = 4, 5  # schema versions
@@ -170,6 +172,21 @@ def has_seals(version: int) -> bool:
     return version >= _FIRST_SEALED
 
 
+def require_support(folder: Path) -> None:
+    """Refuse a Python with an old SQLite, and a folder on a network share."""
+    if sqlite3.sqlite_version_info < LEAST_SQLITE:
+        raise InputError(
+            f"{folder}: SQLite {sqlite3.sqlite_version} of this Python cannot hold a record; "
+            f"needed: {'.'.join(map(str, LEAST_SQLITE))} or later: use another Python"
+        )
+    share = network_share(folder)
+    if share is not None:
+        raise InputError(
+            f"{folder}: is on a network share ({share}), where the record is not safe: name a "
+            "folder on a local disk, and copy the run afterwards"
+        )
+
+
 def harden_connection(database: sqlite3.Connection) -> None:
     """Keep SQLite from running code stored in the file and from loading huge values."""
     database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES)
@@ -178,8 +195,11 @@ def harden_connection(database: sqlite3.Connection) -> None:
 
 
 def connect(path: Path) -> sqlite3.Connection:
-    """Open a file as a record: hardened, with a write-ahead log, each commit flushed to disk."""
-    database = sqlite3.connect(path, timeout=_OPENING_S)
+    """Open a file as a record: hardened, with a write-ahead log, each commit flushed to disk.
+
+    Any thread may use it, one at a time.
+    """
+    database = sqlite3.connect(path, timeout=_OPENING_S, check_same_thread=False)
     try:
         harden_connection(database)
         database.execute("PRAGMA journal_mode=WAL")

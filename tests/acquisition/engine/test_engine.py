@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from acquisition.engine import engine
 from acquisition.engine.engine import Devices, Engine
 from acquisition.plan.moves import Move, moves_between
 from acquisition.plan.plan import Plan, make_plan
@@ -57,22 +58,26 @@ def test_a_reading_is_on_disk_before_the_next_move_counts_as_done(
     small: Loaded, record: Record
 ) -> None:
     devices = open_devices(small)
-    seen: list[int] = []
+    steps, seen = [0], list[tuple[int, int]]()
 
     class Watching(PassThrough):
-        """theta_r, which counts the readings on disk, over its own connection, when it arrives."""
+        """Camera that counts the readings on disk, over a connection of its own."""
 
-        def finish_move(self) -> None:
-            devices.axes["theta_r"].finish_move()
+        def grab(self, count: int) -> list[Frame]:
             path = record.folder / FILE_NAME
             other = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
-            seen.append(other.execute("SELECT COUNT(*) FROM reading").fetchone()[0])
+            seen.append((steps[-1], *other.execute("SELECT COUNT(*) FROM reading").fetchone()))
             other.close()
+            return devices.camera.grab(count)
 
-    axes = devices.axes | {"theta_r": Watching(devices.axes["theta_r"])}
-    plan = run(small, record, replace(devices, axes=axes))  # type: ignore[arg-type]  # a stand-in
-    moved = [s.index for s in plan.steps for m in s.moves if m.axis == "theta_r"]
-    assert seen == moved  # on arrival at step n, n readings are there
+    def begin_step(step: int, scan_s: float) -> None:
+        steps.append(step)
+        devices.begin_step(step, scan_s)
+
+    camera = Watching(devices.camera)
+    plan = run(small, record, replace(devices, camera=camera, begin_step=begin_step))  # type: ignore[arg-type]  # a stand-in
+    assert {step for step, _ in seen} == {step.index for step in plan.steps}
+    assert [count for _, count in seen] == [step for step, _ in seen]
 
 
 def test_the_stage_is_under_way_while_the_frames_are_reduced(
@@ -80,10 +85,10 @@ def test_the_stage_is_under_way_while_the_frames_are_reduced(
 ) -> None:
     devices, calls = open_devices(small), []
     axes = {n: Spy(a, calls, n) for n, a in devices.axes.items()}
-    real = record.add_reading
-    monkeypatch.setattr(record, "add_reading", lambda *a: (calls.append("accept"), real(*a)))
+    real = engine.measure
+    monkeypatch.setattr(engine, "measure", lambda *a: (calls.append("reduce"), real(*a))[1])
     run(small, record, replace(devices, axes=axes))  # type: ignore[arg-type]  # spies
-    at = [n for n, call in enumerate(calls) if call == "accept"][3]  # within one arc
+    at = [n for n, call in enumerate(calls) if call == "reduce"][3]  # within one arc
     before = [c for c in calls[:at] if "move" in c][-1]
     after = next(c for c in calls[at:] if "move" in c)
     assert (before, after) == ("theta_r.start_move", "theta_r.finish_move")

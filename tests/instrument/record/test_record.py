@@ -86,7 +86,7 @@ def test_one_process_at_a_time_scans_into_a_run(tmp_path: Path) -> None:
 
 
 def test_no_record_on_a_network_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("instrument.record.record.network_share", lambda _: "nfs4")
+    monkeypatch.setattr("instrument.record.schema.network_share", lambda _: "nfs4")
     for way in (lambda: Record.create(tmp_path / "run", {}), lambda: Record.open(tmp_path)):
         with pytest.raises(InputError, match=r"network share \(nfs4\).*a folder on a local disk"):
             way()

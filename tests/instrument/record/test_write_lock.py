@@ -81,17 +81,17 @@ def test_a_writer_gives_up_after_a_minute(tmp_path: Path, caplog: pytest.LogCapt
 
 
 def test_a_wait_ends_at_once_with_a_signal(tmp_path: Path) -> None:
-    """SQLite's own wait would hold a Ctrl-C back; nothing is left half done."""
+    """SQLite's own wait would hold a Ctrl-C back; what waits for the lock is written once."""
     with Record.create(tmp_path / "run", {}) as record:
         with held(record.folder / FILE_NAME):
             main = threading.get_ident()
             threading.Timer(0.2, signal.pthread_kill, (main, signal.SIGINT)).start()
             begun_s = time.monotonic()
             with pytest.raises(KeyboardInterrupt):
-                record.add_event("2026", "operator", "never")
+                record.add_event("2026", "operator", "at last")
             assert time.monotonic() - begun_s < PATIENCE_S / 10
         record.add_event("2026", "stopped", "by the operator")
-        assert [text for _, _, text in record.events()] == ["by the operator"]
+        assert [text for _, _, text in record.events()] == ["at last", "by the operator"]
 
 
 def test_a_record_held_from_reading_is_not_called_foreign(tmp_path: Path) -> None:

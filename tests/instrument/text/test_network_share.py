@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from instrument.record.network_share import network_share
+from instrument.text.network_share import network_share
 
 MOUNTS = r"""22 1 8:1 / / rw,relatime shared:1 - ext4 /dev/sda1 rw
 30 22 0:50 / /lab rw,relatime shared:2 - nfs4 server:/lab rw
