@@ -41,20 +41,23 @@ class StopMonitor:
         self._speed: float | None = None
         self._answered_s = begun_s
 
-    def stands(self, now: Status | None, time_s: float) -> bool:
-        """True once two answers report rest at one place; `time_s` is a time before the status."""
+    def stands(self, now: Status | None, before_s: float, after_s: float) -> bool:
+        """True once two answers report rest at one place; each came between the two times."""
         if now is None or now.moving:
             self._rest, self._moved = None, self._moved or now is not None
             return False
         tolerance = self._limits.tolerance_deg
         if self._rest is None or abs(now.position_deg - self._rest[0]) > tolerance:
-            self._rest = now.position_deg, time_s
+            self._rest = now.position_deg, after_s
             return False
-        rested = time_s - self._rest[1] >= STANDS_S
-        return rested and (self._moved or time_s >= self._rest_from_s)
+        rested = before_s - self._rest[1] >= STANDS_S
+        return rested and (self._moved or before_s >= self._rest_from_s)
 
     def should_resend(self, now: Status | None, time_s: float) -> bool:
-        """True if the status is missing, or shows a motion that does not slow down."""
+        """True if the status is missing, or shows a motion that does not slow down.
+
+        `time_s` is a time after the status, whose last part is the position.
+        """
         if now is None:
             self._at = self._speed = None
             late = time_s - self._answered_s >= CHECK_S
@@ -118,11 +121,12 @@ class VerifiedStop:
         while self._wanted():
             if self._unsent is not None:
                 self._send(self._soft)
-            time_s = self._clock.now_s()
+            before_s = self._clock.now_s()
             now = self._read()
-            if monitor.stands(now, time_s):
+            time_s = self._clock.now_s()
+            if monitor.stands(now, before_s, time_s):
                 return
-            if time_s > self._until_s():
+            if before_s > self._until_s():
                 raise self._unconfirmed(now)
             if monitor.should_resend(now, time_s) and self._unsent is None:
                 self._repeat(now, time_s)

@@ -219,17 +219,26 @@ def test_rest_is_believed_only_once_a_move_can_no_longer_begin() -> None:
     """Some controllers still report ready just after the command."""
     rest, moving = Status(0.0, moving=False, homed=True), Status(0.0, moving=True, homed=True)
     monitor = StopMonitor(LIMITS, begun_s=0.0, rest_from_s=0.5)
-    assert [monitor.stands(rest, s) for s in (0.0, 0.1, 0.4, 0.5)] == [False, False, False, True]
+    said = [monitor.stands(rest, s, s) for s in (0.0, 0.1, 0.4, 0.5)]
+    assert said == [False, False, False, True]
     seen = StopMonitor(LIMITS, begun_s=0.0, rest_from_s=0.5)
-    assert [seen.stands(now, s) for now, s in ((moving, 0.0), (rest, 0.1))] == [False, False]
-    assert seen.stands(rest, 0.1 + STANDS_S)
+    assert [seen.stands(now, s, s) for now, s in ((moving, 0.0), (rest, 0.1))] == [False, False]
+    assert seen.stands(rest, 0.1 + STANDS_S, 0.1 + STANDS_S)
+
+
+def test_rest_is_measured_from_the_end_of_an_answer_that_came_late() -> None:
+    """The state may be that of a stage without reference, which still brakes."""
+    monitor = StopMonitor(LIMITS, begun_s=0.0, rest_from_s=0.0)
+    assert not monitor.stands(Status(1.0, moving=False, homed=False), 0.0, 0.1)
+    assert not monitor.stands(Status(1.001, moving=False, homed=False), 0.1, 0.101)
+    assert monitor.stands(Status(1.001, moving=False, homed=False), 0.16, 0.17)
 
 
 def test_rest_at_changing_places_is_no_rest() -> None:
     monitor = StopMonitor(LIMITS, begun_s=0.0, rest_from_s=0.0)
     for number in range(20):
-        turned = Status(number * 1.0, moving=False, homed=True)
-        assert not monitor.stands(turned, number * STANDS_S)
+        turned, time_s = Status(number * 1.0, moving=False, homed=True), number * STANDS_S
+        assert not monitor.stands(turned, time_s, time_s)
 
 
 def test_a_constant_speed_is_no_braking_whatever_the_speed() -> None:
