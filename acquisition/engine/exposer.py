@@ -13,7 +13,7 @@ from acquisition.engine.exposure_check import ExposureCheck
 from acquisition.engine.exposure_search import ExposureSearch
 from acquisition.engine.retrying_camera import RetryingCamera
 from acquisition.interlocks.darks import REFERENCE_FRAMES, DarkCheck
-from acquisition.interlocks.outline import OutlineCheck
+from acquisition.interlocks.outline_check import OutlineCheck
 from acquisition.measure.hot_pixels import hot_pixel_text
 from acquisition.measure.linearity import require_possible_times
 from acquisition.measure.radiometry import Dark, average_dark

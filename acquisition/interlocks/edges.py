@@ -23,6 +23,8 @@ _FLANK = 5  # pixels averaged on each side of a step
 _GAP = 2  # pixels left out on both sides of a step: lens blur spreads it over 3 or 4 pixels
 _MARGIN = 2 * (_FLANK + _GAP)  # pixels that a profile needs on each side of the expected edge
 _LEAST_REACH = 60  # pixels that a profile reaches outwards
+_LEAST_LENGTH = 28  # pixels of an edge: shorter ones have no certain direction
+_CORNER = 4  # pixels left out at both ends of an edge, where another one is near
 _NOISE_RATIO = 8.0  # of a step to the median fluctuation: none of 4 x 96 x 600 samples of noise
 _LEAST_CONTRAST = 0.05  # of the brightest part: weaker steps may be shadows or stray light
 _LIKE_LARGEST = 0.5  # of the profile's largest step: smaller ones are texture
@@ -67,11 +69,15 @@ def _find_edge(
 ) -> FoundEdge | None:
     start, end = corners_px[index], corners_px[(index + 1) % 4]
     normal = outward_normal(corners_px, index)
-    share = np.linspace(0.04, 0.96, _STATIONS)
+    length = float(np.linalg.norm(end - start))
+    if length < _LEAST_LENGTH:
+        return None
+    trimmed = max(0.04, _CORNER / length)
+    share = np.linspace(trimmed, 1 - trimmed, _STATIONS)
     stations = start + share[:, np.newaxis] * (end - start)
     stations = stations[_inside(stations, image.shape, _MARGIN)]
     across = float(np.dot(normal, start - corners_px.mean(axis=0)))  # to the middle
-    if len(stations) < _LEAST_STATIONS or across < 1.5 * _MARGIN:
+    if len(stations) < _LEAST_STATIONS or across < 1.2 * _MARGIN:
         return None
     steps = _Profiles.of(image, range_dn, stations, normal, across).steps()
     return _fit_line(index, stations, normal, steps, _MAX_SCATTER_MM * px_per_mm)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
-from acquisition.interlocks.outline import U_TILT_DEG, Deviation, OutlineCheck
+from acquisition.interlocks.outline import Deviation
+from acquisition.interlocks.outline_check import U_TILT_DEG, OutlineCheck
 from instrument.config.load import Loaded, load_protocol
 from instrument.config.protocol import PatchConfig, Protocol, Sample, SimulatedSample
 from instrument.config.rig import Rig
@@ -39,6 +40,12 @@ class Picture:
     def take(self) -> Image:
         return Sensor(self.scene).picture(self.exposure_s)
 
+    def at(self, theta_r_deg: float, slip_deg: float = 0.0) -> Picture:
+        """The same surface as seen from another angle; `slip_deg` beyond what the stage says."""
+        self.scene.set_axis("theta_r", theta_r_deg)
+        self.scene.true_deg["theta_r"] += slip_deg
+        return replace(self, theta_r_deg=theta_r_deg)
+
 
 @cache
 def _loaded(rig: str) -> Loaded:
@@ -56,8 +63,10 @@ def random_picture(seed: int) -> Picture:
     for axis, angle in pose.items():
         scene.set_axis(axis, angle)
     scene.heights_mm["sample"] = rig.u_placement_mm * rng.standard_normal()
-    turn_deg, tilt_deg = rng.standard_normal(2) * [u.turn_deg, U_TILT_DEG]
-    scene.world = World(turn_deg=float(turn_deg), tilt_deg=float(tilt_deg))
+    turn_deg, tilt_deg, shift_mm = rng.standard_normal(3) * [u.turn_deg, U_TILT_DEG, u.x_mm]
+    scene.world = World(
+        turn_deg=float(turn_deg), tilt_deg=float(tilt_deg), shift_mm=float(shift_mm)
+    )
     scene.begin_step(int(rng.integers(1000)), 0.0)
     level = rig.lamp.white_electrons_per_s * np.cos(np.radians(pose["theta_i"]))
     exposure_s = 10 ** rng.uniform(-1.7, 0.7) * rig.camera.full_well_electrons / level
@@ -113,7 +122,7 @@ def _real_rig(rig: Rig, u: Deviation, theta_r_deg: float, rng: np.random.Generat
     """The rig with an inexact scale, and the axis in the picture where the sample really lies."""
     field_mm = rig.camera.field_width_mm * (1 + u.field * rng.standard_normal())
     pinhole = Pinhole.of(rig)
-    placed_mm = rng.standard_normal(2) * [u.x_mm, u.y_mm]
+    placed_mm = [0.0, u.y_mm * rng.standard_normal()]
     off_px = pinhole.project(placed_mm, theta_r_deg) - pinhole.project([0.0, 0.0], theta_r_deg)
     real = rig.camera.model_copy(
         update={

@@ -1,0 +1,200 @@
+"""Interlock on the outlines of sample and white tile: they must be where the pose puts them.
+
+A step motor that slipped, a sample that was never put in place of the tile: no device reports them,
+the picture does. Edges without contrast or outside the picture say nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.interlocks.edges import find_edges
+from acquisition.interlocks.outline import (
+    LIMIT_SIGMA,
+    Comparison,
+    Deviation,
+    Estimate,
+    Outline,
+    Rectangle,
+)
+from acquisition.measure.radiometry import SATURATION_FRACTION
+from instrument.config.protocol import Protocol
+from instrument.config.rig import Rig
+from instrument.devices import Surface
+from instrument.geometry import FloatArray
+from instrument.pinhole import Pinhole
+
+# Standard uncertainties that neither rig nor protocol states: a scale measured with a steel rule.
+U_SIZE_MM = 0.5  # of the surface's width and height
+U_FIELD = 0.01  # relative, of `field_width_mm`
+U_POSITION_MM = 1.0  # of a surface laid against marks by hand, at most: see `_u_position_mm`
+U_ROLL_DEG = 0.3  # of `roll_deg`, as seen in a picture by eye
+U_TILT_DEG = 0.2  # of the surface from the plane of the axis: 0.1 mm on its edge
+U_AIM_MM = 0.2  # of the axis in the picture from one angle to another: a beam bends
+
+
+@dataclass(slots=True)
+class OutlineCheck:
+    """Interlock on the outlines of the surfaces whose size is known.
+
+    u: standard uncertainties by surface. What the pictures tell of a surface's place and size, and
+    of the camera, counts until another surface takes its place.
+    """
+
+    rig: Rig
+    surfaces: Mapping[Surface, Rectangle]
+    u: Mapping[Surface, Deviation]
+    _placed: Surface | None = None
+    _known: Estimate = field(default_factory=lambda: Estimate.of(Deviation()))
+
+    @classmethod
+    def of(cls, rig: Rig, protocol: Protocol) -> Self:
+        """Return the check of a scan; it knows no surface where the protocol states none."""
+        surfaces: dict[Surface, Rectangle] = {}
+        sample, tile = protocol.sample, protocol.references.white_tile
+        if sample.outline == "rectangle":
+            surfaces["sample"] = Rectangle(sample.width_mm, sample.height_mm)
+        if tile is not None and tile.width_mm is not None and tile.height_mm is not None:
+            surfaces["white tile"] = Rectangle(tile.width_mm, tile.height_mm)
+        u = {name: _uncertainty(rig, protocol, size) for name, size in surfaces.items()}
+        return cls(rig, surfaces, u)
+
+    def compare(self, image: NDArray[Any], surface: Surface, theta_r_deg: float) -> Comparison:
+        """Find the edges of a known surface in an image (rows, columns) in DN."""
+        pinhole, camera = Pinhole.of(self.rig), self.rig.camera
+        known = self._known if surface == self._placed else Estimate.of(self.u[surface])
+        outline = Outline(pinhole, theta_r_deg, self.surfaces[surface], known)
+        scale = pinhole.focal_px / pinhole.beam_length_mm
+        range_dn = camera.black_level_dn, SATURATION_FRACTION * camera.max_dn
+        return Comparison(outline, find_edges(image, range_dn, outline.corners_px(), scale))
+
+    def contradiction(self, image: NDArray[Any], surface: Surface, theta_r_deg: float) -> str:
+        """Return how an image (rows, columns) in DN contradicts the pose; empty if it does not."""
+        if surface not in self.surfaces:
+            self._placed = None
+            return ""
+        found = self.compare(image, surface, theta_r_deg)
+        if not found.contradicts:
+            self._placed = surface
+            self._known = found.learnt() if found.edges else found.outline.known
+            return ""
+        return (
+            f"interlock outline: the {surface} ({found.outline.surface}) is not where theta_r "
+            f"{theta_r_deg:g} deg puts it in the picture: {_edges_text(found)}; its angle, height, "
+            "position and size and the scale of the picture are not so uncertain (chi2 "
+            f"{found.chi2:.3g}, allowed {found.chi2_limit:.3g}). "
+            f"{self._explanation(found, surface)}"
+        )
+
+    def _explanation(self, found: Comparison, surface: Surface) -> str:
+        """Return what explains the edges, and what to look at."""
+        for other in self.surfaces:
+            if other == surface:
+                continue
+            known = Estimate.of(self.u[other])
+            changed = replace(found.outline, surface=self.surfaces[other], known=known)
+            if not Comparison(changed, found.edges).contradicts:
+                return (
+                    f"The {other} ({self.surfaces[other]}) would look like this: is it still on "
+                    "the table?"
+                )
+        return _best_explanation(found)
+
+
+def _uncertainty(rig: Rig, protocol: Protocol, surface: Rectangle) -> Deviation:
+    position_mm = _u_position_mm(rig, protocol, surface)
+    return Deviation(
+        theta_r_deg=rig.axes["theta_r"].u_deg,
+        column_mm=U_AIM_MM,
+        row_mm=U_AIM_MM,
+        x_mm=position_mm,
+        y_mm=position_mm,
+        turn_deg=float(np.degrees(position_mm / min(surface.width_mm, surface.height_mm))),
+        z_mm=rig.u_placement_mm,
+        lean_deg=U_TILT_DEG,
+        tilt_deg=U_TILT_DEG,
+        width_mm=U_SIZE_MM,
+        height_mm=U_SIZE_MM,
+        field=U_FIELD,
+        roll_deg=U_ROLL_DEG,
+    )
+
+
+def _u_position_mm(rig: Rig, protocol: Protocol, surface: Rectangle) -> float:
+    """Return u of the surface's position: the measured patch must not reach past its edge."""
+    window = protocol.window
+    room_mm = min(surface.width_mm - window.width_mm, surface.height_mm - window.height_mm) / 2
+    return min(U_POSITION_MM, max(room_mm / LIMIT_SIGMA, rig.u_placement_mm))
+
+
+def _edges_text(found: Comparison) -> str:
+    """Return the edges that were found, and how far off their farther end is, in mm at the axis."""
+    pinhole = found.outline.pinhole
+    mm = pinhole.beam_length_mm / pinhole.focal_px
+    words = []
+    for edge in found.edges:
+        offset_mm = max(edge.offsets_px * mm, key=abs)
+        way = "out" if offset_mm > 0 else "in"
+        words.append(f"{_side(edge.normal)} edge {abs(offset_mm):.2f} mm too far {way}")
+    return ", ".join(words)
+
+
+def _side(normal: FloatArray) -> str:
+    """Return the side of the picture to which an outward normal (2,) points."""
+    column, row = normal.tolist()
+    if abs(column) > abs(row):
+        return "right" if column > 0 else "left"
+    return "lower" if row > 0 else "upper"
+
+
+def _best_explanation(found: Comparison) -> str:
+    """Return the view angle, place and size that would look like this, and what to look at."""
+    fits = {names: found.with_free(*names) for names in _EXPLANATIONS}
+    best = min(chi2 for _, _, chi2 in fits.values())
+    texts = [
+        _EXPLANATIONS[names](found.outline, at, u)
+        for names, (at, u, chi2) in fits.items()
+        if chi2 <= min(best + LIMIT_SIGMA**2, found.chi2_limit)
+    ]
+    if texts:
+        return "; or: ".join(texts)
+    return (
+        "No view angle, place or size of a rectangle explains it: look at what lies on the table; "
+        "for a sample that is not a thin rectangle write `outline: none` into the protocol's sample"
+    )
+
+
+def _angle_text(outline: Outline, at: Deviation, u: Deviation) -> str:
+    return (
+        f"The picture is that of theta_r {outline.theta_r_deg + at.theta_r_deg:.1f} deg (u "
+        f"{u.theta_r_deg:.1g}): look whether the stage slips or has lost its reference, and "
+        "whether the surface is tilted"
+    )
+
+
+def _place_text(_outline: Outline, at: Deviation, _u: Deviation) -> str:
+    return (
+        f"A surface {np.hypot(at.x_mm, at.y_mm):.1f} mm off its place and turned by "
+        f"{abs(at.turn_deg):.1f} deg would look like this: look whether it has moved"
+    )
+
+
+def _size_text(outline: Outline, at: Deviation, _u: Deviation) -> str:
+    surface = outline.surface
+    seen = Rectangle(surface.width_mm + at.width_mm, surface.height_mm + at.height_mm)
+    return (
+        f"A surface of {seen} would look like this: look what lies on the table, and measure the "
+        "size that the protocol states"
+    )
+
+
+_EXPLANATIONS = {
+    ("theta_r_deg",): _angle_text,
+    ("x_mm", "y_mm", "turn_deg"): _place_text,
+    ("width_mm", "height_mm"): _size_text,
+}
