@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from acquisition.measure.drift import JUMP_U, MIN_JUMP, Drift, is_usable, rate
+from acquisition.measure.drift import JUMP_U, MIN_JUMP, Drift, is_misplaced, is_usable, rate
 from instrument.record.reading import Check, Reading
 
 UNPROVEN = "lamp failed at the next reference"
@@ -43,7 +43,11 @@ def failed(check: Check) -> bool:
 
     One of the tile is recorded only where it contradicts the lamp's angle.
     """
-    return check.jumped or not is_usable(check.reading) or check.reading.kind == "tile"
+    return check.jumped or _is_bad(check.reading) or check.reading.kind == "tile"
+
+
+def _is_bad(reading: Reading) -> bool:
+    return not is_usable(reading) and not is_misplaced(reading)
 
 
 def check_text(check: Check) -> str:
@@ -68,7 +72,7 @@ def doubtful_steps(readings: Iterable[Reading], checks: Iterable[Check]) -> froz
     spans: dict[int, list[tuple[float, float]]] = {}
     own, wrong_until_s = list(readings), dict[int, float]()
     for block in {reading.block for reading in own}:
-        made = [(r.time_s, is_usable(r), is_usable(r)) for r in own if _is_check_of(r, block)]
+        made = [(r.time_s, not _is_bad(r), is_usable(r)) for r in own if _is_check_of(r, block)]
         made += [
             (c.reading.time_s, not failed(c), is_usable(c.reading))
             for c in checks

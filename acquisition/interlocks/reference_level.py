@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from acquisition.measure.drift import MIN_SIGNAL_U, Drift, rate, u_unknown_trend
+from acquisition.measure.drift import MIN_SIGNAL_U, Drift, is_misplaced, rate, u_unknown_trend
 from acquisition.measure.placement import Placement
 from instrument.config.rig import Rig
 from instrument.record.reading import Reading
@@ -28,6 +28,8 @@ _NEXT_SETTING = 0.01  # change of the lamp's output when it is moved by hand (as
 
 def level_doubt(reading: Reading, rig: Rig) -> str:
     """Return why a reference is too dark or too bright, empty if it is neither."""
+    if is_misplaced(reading):
+        return ""
     name = f"{reading.surface} at theta_i {reading.theta_i_deg:g} deg"
     if not reading.signal_dn > MIN_SIGNAL_U * reading.u_noise_dn:
         return (

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from acquisition.measure.radiometry import FEW_PIXELS, LEAVES_FRAME
 from instrument.geometry import FloatArray, IntArray
 from instrument.record.reading import Check, Reading
 
@@ -216,6 +217,11 @@ def u_unknown_trend(apart_s: float) -> float:
 def is_usable(check: Reading) -> bool:
     """Return True if a drift check has no flags and a signal far above its noise."""
     return not check.flags and check.signal_dn > max(MIN_SIGNAL_U * check.u_noise_dn, 0.0)
+
+
+def is_misplaced(reading: Reading) -> bool:
+    """Return True for a reading without a window to speak of: it says nothing about the lamp."""
+    return bool({LEAVES_FRAME, FEW_PIXELS} & set(reading.flags.split("; ")))
 
 
 def rate(reading: Reading) -> float:

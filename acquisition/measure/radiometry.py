@@ -21,6 +21,7 @@ from instrument.geometry import BoolArray, FloatArray
 SATURATION_FRACTION = 0.97  # of full scale: above it the response is not trusted
 # Shares of the window's weight, above which a reading is flagged; less is part of its uncertainty.
 SATURATED_SHARE, HOT_SHARE = 0.001, 0.01
+LEAVES_FRAME, FEW_PIXELS = "window leaves frame", "too few pixels"
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,8 +175,8 @@ def _flags(
     """
     saturated, hot = shares
     flags = {
-        "window leaves frame": not window.inside_frame,
-        "too few pixels": window.pixels < min_pixels,
+        LEAVES_FRAME: not window.inside_frame,
+        FEW_PIXELS: window.pixels < min_pixels,
         "saturated": saturated > SATURATED_SHARE or peak_dn >= SATURATION_FRACTION * camera.max_dn,
         "hot pixels": hot > HOT_SHARE,
     }

@@ -32,6 +32,7 @@ class Case(NamedTuple):
 
 
 WITH_TILE = "  white_tile: {reflectance: 0.99, u_reflectance: 0.005, theta_r_deg: 10.0}\n"
+DRIFT_CHECK = "  drift_check: {theta_r_deg: 10.0, every_points: 25}\n"
 CASES = {
     "adequate": Case({}, 0, "adequate"),
     "no candidate is adequate": Case({}, 0, "none adequate", model="lambert"),
@@ -46,11 +47,11 @@ CASES = {
         "1 point is too few",
         "oren_nayar",
     ),
-    "black sample": Case(
-        {"albedo: 0.80": "albedo: 0.0", "ks: 0.076": "ks: 0.0"},
-        5,
-        "not identifiable",
-        "no light in this table",
+    "black sample, no later reading that proves that the lamp was on": Case(
+        {"albedo: 0.80": "albedo: 0.0", "ks: 0.076": "ks: 0.0", DRIFT_CHECK: ""},
+        3,
+        None,
+        "no measurement: all 17 points are flagged (no signal)",
     ),
     "every point flagged": Case(
         {"width_mm: 20.0, height_mm: 20.0": "width_mm: 0.3, height_mm: 0.3"},
@@ -84,6 +85,8 @@ def test_four_commands_end_with_the_same_code_and_verdict(case: Case, tmp_path: 
             assert f"{run}: {COMPLETE}" in done.stderr
         assert {path.name for path in run.iterdir()} >= FILES
         assert json.loads((run / "fit.json").read_text())["verdict"] == case.verdict
+        if case.verdict is None:
+            assert f"No model was fitted: {case.words}" in (run / "report.html").read_text()
 
 
 @pytest.mark.parametrize(
