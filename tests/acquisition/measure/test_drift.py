@@ -139,3 +139,30 @@ def test_levels_are_those_of_the_checks(tmp_path: Path) -> None:
     assert share == pytest.approx([0, 0, 0, 0.5, 0.5])
     level = [rate(r) / rate(made[0]) for r in made]
     assert drift.at(float(middle_s[0])) == pytest.approx((level[0] + level[1]) / 2)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_small_step_between_two_checks_is_within_three_u(seed: int) -> None:
+    """A step that is no interlock, at a random moment of a random interval, in a drifting lamp."""
+    random = np.random.default_rng(seed)
+    times_s = 100.0 * np.arange(7) + random.uniform(0, 30, 7)
+    trend, size = random.uniform(-0.02, 0.02) / 3600, random.choice([-1, 1]) * 0.02
+    moment_s = random.uniform(times_s[0], times_s[-1])
+
+    def level(at_s: np.ndarray) -> np.ndarray:
+        return np.asarray(1 + trend * at_s + size * (at_s > moment_s))
+
+    made = [check(n, float(t), 1000 * float(v)) for n, (t, v) in enumerate(
+        zip(times_s, level(times_s), strict=True))]  # fmt: skip
+    drift = Drift.of([replace(c, u_noise_dn=0.1) for c in made], 0)
+    inside_s = np.linspace(times_s[0] + 0.1, times_s[-1], 200)
+    error = np.array([drift.at(t) for t in inside_s]) * level(times_s[:1]) / level(inside_s) - 1
+    assert np.max(np.abs(error)) > 0.005
+    assert np.all(np.abs(error) <= 3 * drift.u_between(inside_s) + 1e-4)
+
+
+@pytest.mark.parametrize("settling_s", [200.0, 600.0, 3000.0])
+def test_a_lamp_that_warms_up_steadily_adds_no_uncertainty(settling_s: float) -> None:
+    made = [check(n, 60.0 * n, 1000 * (1 - 0.005 * math.exp(-60.0 * n / settling_s)))
+            for n in range(8)]  # fmt: skip
+    assert not np.any(Drift.of(made, 0).u_between(np.linspace(0.0, 420.0, 50)))
