@@ -11,7 +11,9 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
+from drivers.lines import device_lock
 from tests.support.stop_trials.bench import Bench
 from tests.support.stop_trials.files import arguments, next_arguments, write_files
 from tests.support.stop_trials.program import Program
@@ -53,11 +55,18 @@ def run_trial(trial: Trial) -> Seen:
     with contextlib.ExitStack() as opened:
         opened.callback(shutil.rmtree, folder, ignore_errors=True)
         bench = opened.enter_context(Bench(trial, folder / "port"))
+        opened.callback(_remove_lock, bench.port)
         write_files(trial, folder, bench.port)
         errors = folder / "errors" if trial.fault == "dropped terminal" and trial.at_once else None
         program = Program(folder, arguments(trial, folder), trial.real_start, errors)
         opened.callback(program.close)
         return _Course(trial, folder, bench, program).run()
+
+
+def _remove_lock(port: str) -> None:
+    """Remove the file that a command started as a user starts it has locked for the port."""
+    for folder in device_lock._FOLDERS:
+        (folder / f"gonio-{quote(port.lower(), safe='')}.lock").unlink(missing_ok=True)
 
 
 class _Course:

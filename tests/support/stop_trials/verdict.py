@@ -128,7 +128,8 @@ def _not_told(trial: Trial, seen: Seen) -> list[str]:
     moving, text = seen.next_found["moving"], seen.next_text
     ended_deg = seen.next_found["motions"][-1]["to_deg"]
     known = seen.next_found["referenced"] or moving
-    if known and "moving" not in text and not _names(ended_deg, text):
+    told = _names(ended_deg, text) or (moving and "moving" in text)
+    if known and not told:
         found.append(
             f"found {'moving to' if moving else 'at'} {ended_deg:.3f} deg, and the next start does "
             f"not say so: {text!r}"
