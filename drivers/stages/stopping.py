@@ -108,11 +108,13 @@ class VerifiedStop:
         self._unsent: DeviceError | None = None
         self._unread: DeviceError | None = None
         self._reported_s: float | None = None
+        self._late_since_s: float | None = None
 
     def begin(self) -> None:
         """Send the stop at once; a stop that cannot be sent is sent again by `finish`."""
         self._begun_s, self._sent_s = self._clock.now_s(), None
-        self._times, self._unread, self._reported_s = 0, None, None
+        self._times, self._unread = 0, None
+        self._reported_s = self._late_since_s = None
         self._send(self._soft)
 
     def finish(self, rest_from_s: float) -> None:
@@ -126,7 +128,7 @@ class VerifiedStop:
             time_s = self._clock.now_s()
             if monitor.stands(now, before_s, time_s):
                 return
-            if before_s > self._until_s():
+            if self._too_late(before_s):
                 raise self._unconfirmed(now)
             if monitor.should_resend(now, time_s) and self._unsent is None:
                 self._repeat(now, time_s)
@@ -156,10 +158,10 @@ class VerifiedStop:
         return now
 
     def _repeat(self, now: Status | None, time_s: float) -> None:
-        self._report(now, time_s)
         sent_s = time_s if self._sent_s is None else self._sent_s
         harder = time_s - sent_s > self._brakes_s + HARDER_AFTER_S
         self._send(self._harder if harder else self._soft)
+        self._report(now, time_s)  # after it: a terminal may hold up what is logged
 
     def _report(self, now: Status | None, time_s: float) -> None:
         """Log that a stop is sent again, the first time and then once a second."""
@@ -168,6 +170,13 @@ class VerifiedStop:
         self._reported_s, since_s = time_s, time_s - self._begun_s
         seen = f"no status ({self._unread})" if now is None else f"at {now.position_deg:g} deg"
         log.warning("%s: no rest %.2f s after a stop, %s: sent again", self._name, since_s, seen)
+
+    def _too_late(self, time_s: float) -> bool:
+        """True if the time is up, and was up some answers ago: the computer may have paused."""
+        if time_s <= self._until_s():
+            return False
+        self._late_since_s = self._late_since_s or time_s
+        return time_s - self._late_since_s > 2 * STANDS_S
 
     def _until_s(self) -> float:
         """Return the time of the clock until which the stage must be read to stand.
@@ -185,9 +194,9 @@ class VerifiedStop:
         since_s = self._clock.now_s() - self._begun_s
         if now is not None:
             return DeviceError(
-                f"{self._name}: still moves, at {now.position_deg:g} deg, {since_s:.1f} s after it "
-                f"was told to stop ({self._times} times): cut its power, then look at its "
-                "controller"
+                f"{self._name}: may still move: not at rest at {now.position_deg:g} deg, "
+                f"{since_s:.1f} s after it was told to stop ({self._times} times): cut its power, "
+                "then look at its controller"
             )
         error = self._unsent or self._unread or DeviceError("no status")
         told = f"told to stop ({self._times} times), but" if self._times else "stop not sent, and"
