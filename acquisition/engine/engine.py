@@ -179,9 +179,9 @@ class Engine:
             return
         # An index of its own, so that a simulated scene draws new noise.
         step = replace(original, index=len(plan.steps) + len(progress.checks), preview=False)
-        self._begin_step(step.index, progress.elapsed_s)
         self._place(step.surface)
         self._positioner.move_to(step.pose)
+        self._begin_step(step.index, progress.elapsed_s)
         elapsed_s = progress.elapsed_s
         for attempt in range(ATTEMPTS):
             reading = self._measure(self._expose(step))
