@@ -14,6 +14,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -30,10 +31,13 @@ def main() -> int:
                 env={**os.environ, **_hung_disk(Path(name)), _PRELOADED: "1"}, check=False,
             ).returncode  # fmt: skip
     from tests.support.stop_trials.tally import exceptions, tree
+    from tests.support.stop_trials.trial import draw
     from tests.support.stop_trials.workers import run_all
 
     first, _, end = wanted.seeds.partition(":")
-    seeds = range(int(first), int(end) if end else int(first) + 1)
+    seeds: Sequence[int] = range(int(first), int(end) if end else int(first) + 1)
+    if wanted.fault:
+        seeds = [seed for seed in seeds if draw(seed).fault == wanted.fault]
     gc.collect()
     gc.freeze()  # what the forked processes share
     outcomes = []
@@ -51,6 +55,7 @@ def main() -> int:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="tests.support.stop_trials")
     parser.add_argument("--seeds", default="0:24", help="one seed, or FIRST:END")
+    parser.add_argument("--fault", help="only the seeds that draw this fault")
     parser.add_argument("--at-once", type=int, default=8, help="trials at the same time")
     parser.add_argument("--out", type=Path, help="file for the outcomes, a JSON object a line")
     parser.add_argument("--show", action="store_true", help="print all that a trial has seen")

@@ -58,6 +58,8 @@ def verdict(trial: Trial, seen: Seen) -> Verdict:
         )
     if seen.at_end["moving"] and _ENDED in seen.text:
         wrong.append(f"moves when the command has said: {seen.text[-300:]!r}")
+    if math.isinf(trial.seconds) and _ENDED in seen.text:
+        wrong.append(f"says what it cannot have read: {seen.text[-300:]!r}")
     how = "stood" if in_time else "said"
     return Verdict(how, tuple(wrong), after_s, braking_s, late_s, moved)
 
