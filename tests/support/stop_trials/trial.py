@@ -132,7 +132,7 @@ def _moment(rng: random.Random) -> float:
 def _seconds(rng: random.Random, fault: str) -> float:
     match fault:
         case "hung disk" | "held record":
-            return rng.uniform(1.0, 6.0)
+            return rng.uniform(1.0, 4.0)
         case "lost answers" | "unplugged":
             return rng.choice((rng.uniform(0.02, 0.4), rng.uniform(0.4, 2.5), float("inf")))
         case "frozen":
