@@ -13,7 +13,8 @@ from acquisition.engine.exposure_check import ExposureCheck
 from acquisition.engine.exposure_search import ExposureSearch
 from acquisition.engine.retrying_camera import RetryingCamera
 from acquisition.interlocks.darks import REFERENCE_FRAMES, DarkCheck
-from acquisition.interlocks.outline_check import OutlineCheck
+from acquisition.interlocks.picture.outline_check import OutlineCheck
+from acquisition.interlocks.picture.swap import SwapCheck
 from acquisition.measure.hot_pixels import hot_pixel_text
 from acquisition.measure.linearity import require_possible_times
 from acquisition.measure.radiometry import Dark, average_dark
@@ -75,12 +76,14 @@ class Exposer:
     _used_before: frozenset[float] = field(default=frozenset(), init=False)
     _last: dict[Surface, Reading] = field(default_factory=dict, init=False)
     _outline: OutlineCheck = field(init=False)
+    _swap: SwapCheck = field(init=False)
 
     def __post_init__(self) -> None:
         target = self.protocol.exposure_target
         self._search = ExposureSearch(self.camera, self.rig.camera, target)
         self._dark_check = DarkCheck(self.rig)
         self._outline = OutlineCheck.of(self.rig, self.protocol)
+        self._swap = SwapCheck(self.rig.camera)
         self._check = ExposureCheck(self.rig.camera, self.clock, self.running_s, self.record)
 
     def restore(self, readings: Sequence[Reading]) -> None:
@@ -102,6 +105,7 @@ class Exposer:
         guess_s = self._first_guess_s(step)
         tried = self._comparison(guess_s) + self._search.frames(guess_s, window)
         first = self._at_its_place(tried.pop(), step)
+        self._require_swapped(first, step)
         frames, first_s = [first], self.scan_s()
         if step.frames > 1:
             frames += self.camera.grab(step.frames - 1)
@@ -111,6 +115,13 @@ class Exposer:
         dark = self._dark(first.exposure_s, window)
         self._check.require_proportional(tried, frames, self._darks, window)
         return Exposed(step, frames, dark, time_s=time_s, free_s=self.scan_s(), time_utc=utc)
+
+    def _require_swapped(self, first: Frame, step: Step) -> None:
+        """Raise `Interlock` if a reference shows the surface that should have been taken away."""
+        if step.kind != "point" and (
+            text := self._swap.contradiction(first, step.surface, step.pose)
+        ):
+            raise Interlock(f"{text}. gonio resume goes on")
 
     def _at_its_place(self, first: Frame, step: Step) -> Frame:
         """Return a first frame that shows the surface where the pose puts it, or a second one."""

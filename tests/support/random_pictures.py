@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from acquisition.interlocks.outline import Deviation
-from acquisition.interlocks.outline_check import U_TILT_DEG, OutlineCheck
+from acquisition.interlocks.picture.outline import Deviation
+from acquisition.interlocks.picture.outline_check import U_TILT_DEG, OutlineCheck
 from instrument.config.load import Loaded, load_protocol
 from instrument.config.protocol import PatchConfig, Protocol, Sample, SimulatedSample
 from instrument.config.rig import Rig

@@ -14,7 +14,7 @@ from typing import Self
 
 import numpy as np
 
-from acquisition.interlocks.edges import FoundEdge
+from acquisition.interlocks.picture.edges import FoundEdge
 from instrument.geometry import FloatArray
 from instrument.pinhole import Pinhole, rectangle_mm
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.interlocks.outline import CHI2_LIMITS, LIMIT_SIGMA, Deviation
-from acquisition.interlocks.outline_check import OutlineCheck
+from acquisition.interlocks.picture.outline import CHI2_LIMITS, LIMIT_SIGMA, Deviation
+from acquisition.interlocks.picture.outline_check import OutlineCheck
 from instrument.config.load import Loaded, load_protocol
 from instrument.config.protocol import References, WhiteTile
 from instrument.devices import Image

@@ -13,8 +13,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.interlocks.edges import find_edges
-from acquisition.interlocks.outline import (
+from acquisition.interlocks.picture.edges import find_edges
+from acquisition.interlocks.picture.outline import (
     LIMIT_SIGMA,
     Comparison,
     Deviation,

@@ -1,0 +1,1 @@
+"""Interlocks on the whole picture: the outline of the surface, and whether it was swapped."""
