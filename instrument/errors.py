@@ -32,7 +32,7 @@ class DeviceError(GonioError):
 
 
 class ComputerPaused(DeviceError):
-    """Computer that ran nothing of this program while a stage moved, so that it was stopped.
+    """Computer that ran too little of this program while a stage moved, so that it was stopped.
 
     No device is at fault: a stage that stands and has its reference may be moved on.
     """

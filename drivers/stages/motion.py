@@ -156,7 +156,7 @@ class MoveMonitor(Monitor):
             self._at, self._at_s = now.position_deg, time_s
         since_s = time_s - self._sent_s
         where = f"at {now.position_deg:g} deg on the way to {self._target:g} deg"
-        if self._astray_deg(now.position_deg) > ASTRAY_DEG:
+        if now.homed and self._astray_deg(now.position_deg) > ASTRAY_DEG:
             return (
                 f"runs astray, {where} from {self._start:g} deg: look at its encoder, and at what "
                 "else commands it, then home it"

@@ -58,6 +58,7 @@ class MotorStage(ABC):
         self._target_deg: float | None = None
         self._motion: Monitor | None = None
         self._stopped = self._speed_known = False
+        self._stops_asked = self._stops_seen = 0
         self._stop = VerifiedStop(
             name, limits, clock, reply_s, send=self._send_stop, send_harder=self._send_harder_stop,
             status=self._status_after_stop, wanted=lambda: self._stopped,
@@ -134,6 +135,7 @@ class MotorStage(ABC):
     def _status_before_motion(self) -> Status:
         """Return the status at rest; refuse a stage that is still executing a move."""
         self.watchdog.finish_stop()
+        self._stops_seen = self._stops_asked
         now = self.status()
         if now.moving and not self._stopped:
             raise DeviceError(
@@ -182,11 +184,10 @@ class MotorStage(ABC):
         self._speed_known = False  # what is read back need not be what is done
 
     def _find_reference(self, again: bool) -> None:
-        self._stopped, self._target_deg = False, None
-        self._motion = HomingMonitor(self._limits.homing_s, self._clock.now_s(), again)
-        self.watchdog.begin()
+        self._target_deg = None
+        self._begin(HomingMonitor(self._limits.homing_s, self._clock.now_s(), again))
         self._send(self._send_home)
-        self._monitor(self._motion, "homing command", self._send_home)
+        self._monitor("homing command", self._send_home)
         self.watchdog.end()
 
     def start_move(self, angle_deg: float) -> None:
@@ -199,9 +200,8 @@ class MotorStage(ABC):
         self._refuse_fault(now)
         if not now.homed:
             raise DeviceError(f"{self.name}: not homed, so it must not move: home it first")
-        self._stopped, self._target_deg = False, angle_deg
-        self._motion = MoveMonitor(self._limits, now.position_deg, angle_deg, self._clock.now_s())
-        self.watchdog.begin()
+        self._target_deg, start_deg = angle_deg, now.position_deg
+        self._begin(MoveMonitor(self._limits, start_deg, angle_deg, self._clock.now_s()))
         with self._explained():
             self._send(lambda: self._send_move(angle_deg))
 
@@ -211,17 +211,17 @@ class MotorStage(ABC):
         if target_deg is None or not isinstance(motion, MoveMonitor):
             return self.position_deg()
         what = f"move to {target_deg:g} deg"
-        now = self._monitor(motion, what, lambda: self._send_move(target_deg))
+        now = self._monitor(what, lambda: self._send_move(target_deg))
         arrived_deg = self._check_arrival(now)
         self._check_speed(motion)
         self.watchdog.end()
         return arrived_deg
 
-    def _monitor(self, motion: Monitor, what: str, resend: Callable[[], None]) -> Status:
+    def _monitor(self, what: str, resend: Callable[[], None]) -> Status:
         """Return the status at the end of a motion; if anything else ends it, it is watched on."""
         while True:
-            now = self._poll()
-            if motion.ended:
+            now, motion = self._poll(), self._motion
+            if motion is None or motion.ended:
                 return now
             if motion.NEEDS_REFERENCE:
                 self._refuse_lost_reference(now)
@@ -254,7 +254,7 @@ class MotorStage(ABC):
 
         It does not wait: whether the stage stands, `finish_stop` says.
         """
-        self._stopped = True
+        self._stopped, self._stops_asked = True, self._stops_asked + 1
         self.watchdog.end()
         self._stop.begin()
 
@@ -354,6 +354,14 @@ class MotorStage(ABC):
                 "stage, then home it"
             )
         return now.position_deg
+
+    def _begin(self, motion: Monitor) -> None:
+        """Begin to watch a motion, unless a stop has come since the status before it was read."""
+        self._stopped, self._motion = False, motion
+        if self._stops_asked != self._stops_seen:
+            self._stopped = True
+            raise Stopped(f"{self.name}: stopped before it was told to move")
+        self.watchdog.begin()
 
     def _send(self, command: Callable[[], None]) -> None:
         """Send a motion command; repeat a stop that came meanwhile, and raise `Stopped`."""

@@ -203,6 +203,27 @@ def test_a_stop_before_the_move_command_leaves_is_repeated_and_read_back(
     assert abs(found.motor.position_deg) < 20.0
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_stop_while_the_status_before_a_move_is_read_keeps_it_from_being_sent(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found, stage = slow_stage(kind, monkeypatch)
+    status, begun = stage.status, found.moves()
+
+    def stopped_meanwhile(retry: bool = True) -> Status:
+        monkeypatch.setattr(stage, "status", status)
+        stage.begin_stop()
+        return status(retry)
+
+    monkeypatch.setattr(stage, "status", stopped_meanwhile)
+    with pytest.raises(Stopped, match="theta_r: stopped before it was told to move"):
+        stage.start_move(80.0)
+    stage.finish_stop()
+    assert found.moves() == begun
+    stage.start_move(5.0)  # and may be told to move anew
+    assert stage.wait() == pytest.approx(5.0, abs=0.01)
+
+
 def test_an_error_that_a_spoilt_stop_has_left_refuses_no_later_move(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
