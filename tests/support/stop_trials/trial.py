@@ -71,7 +71,7 @@ def draw(seed: int) -> Trial:
     command = {"moving": "move", "homing": "home"}[motion]
     if fault in ON_DISK or rng.random() < 0.2:
         command = "run"
-    speed = rng.uniform(20.0, 60.0)
+    speed = rng.uniform(40.0 if command == "run" else 20.0, 60.0)
     start, target = _way(rng)
     return Trial(
         seed=seed,
