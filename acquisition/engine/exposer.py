@@ -12,7 +12,7 @@ import numpy as np
 from acquisition.engine.exposure_check import ExposureCheck
 from acquisition.engine.exposure_search import ExposureSearch
 from acquisition.engine.retrying_camera import RetryingCamera
-from acquisition.interlocks.darks import REFERENCE_FRAMES, DarkCheck
+from acquisition.interlocks.darks import REFERENCE_FRAMES, DarkCheck, Excess
 from acquisition.interlocks.picture.outline_check import OutlineCheck
 from acquisition.interlocks.picture.swap import SwapCheck
 from acquisition.measure.hot_pixels import hot_pixel_text
@@ -189,20 +189,22 @@ class Exposer:
         """
         if not exposures_s:
             return
-        darks = self._without_light(exposures_s)
-        if (found := self._dark_check.worst(darks, window)) is not None:
+        darks = self._without_light(exposures_s, window)
+        if (found := _too_bright(darks)) is not None:
             log.warning("darks: %s: taken again", found.text())
             self._dark_check.forget_reference()
-            darks = self._without_light(exposures_s)
-            if (found := self._dark_check.worst(darks, window)) is not None:
+            darks = self._without_light(exposures_s, window)
+            if (found := _too_bright(darks)) is not None:
                 raise Interlock(f"darks: {found.text()}; {_LOOK_FOR_LIGHT}")
-        for dark in darks:
-            self._keep(dark, window)
+        for dark, found in darks:
+            self._keep(dark, found)
         self.lamp.light()
         self._note_cover("lamp uncovered")
 
-    def _without_light(self, exposures_s: Sequence[float]) -> list[Dark]:
-        """Darken the lamp and return the darks of these exposures."""
+    def _without_light(
+        self, exposures_s: Sequence[float], window: Window
+    ) -> list[tuple[Dark, Excess]]:
+        """Darken the lamp and return the darks of these exposures, with the light in them."""
         self.lamp.darken()
         self._note_cover("lamp covered for the darks")
         reference_s = self._dark_check.reference_s(exposures_s)
@@ -212,7 +214,7 @@ class Exposer:
             self._start_s += self.running_s() - begun_s  # no scan time
         darks = [self._grab_dark(e, self.protocol.dark_frames) for e in exposures_s]
         self._dark_check.set_reference(darks)
-        return darks
+        return [(dark, self._dark_check.excess(dark, window)) for dark in darks]
 
     def _grab_dark(self, exposure_s: float, count: int) -> Dark:
         self._search.set(exposure_s)
@@ -220,9 +222,8 @@ class Exposer:
         require_possible_times(frames)
         return average_dark(frames, self.rig.camera)
 
-    def _keep(self, dark: Dark, window: Window) -> None:
+    def _keep(self, dark: Dark, found: Excess) -> None:
         """Record a dark, and use it from now on."""
-        found = self._dark_check.excess(dark, window)
         if found.light_dn > 0:
             log.warning("darks: %s: subtracted, and taken as uncertain", found.text())
         self._darks[dark.exposure_s] = replace(dark, light_dn=found.light_dn)
@@ -235,3 +236,8 @@ class Exposer:
     def _note_cover(self, text: str) -> None:
         if self.rig.lamp.darkened_by == "hand":
             self.record.add_event(self.clock.utc().isoformat(), OPERATOR, text)
+
+
+def _too_bright(darks: Sequence[tuple[Dark, Excess]]) -> Excess | None:
+    """Return the excess of the first dark that cannot be used, None if all can be."""
+    return next((found for _, found in darks if found.is_too_much), None)

@@ -91,11 +91,6 @@ class DarkCheck:
         """Have the reference taken again: it may have been as wrong as the dark."""
         self._reference = None
 
-    def worst(self, darks: Sequence[Dark], window: Window) -> Excess | None:
-        """Return the excess of the first dark that cannot be used, None if all can be."""
-        found = (self.excess(dark, window) for dark in darks)
-        return next((one for one in found if one.is_too_much), None)
-
     def excess(self, dark: Dark, window: Window) -> Excess:
         """Return the excess of a dark within a window."""
         camera, exposure_s = self.rig.camera, dark.exposure_s

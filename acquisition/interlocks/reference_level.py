@@ -9,7 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from acquisition.measure.drift import MIN_SIGNAL_U, Drift, is_misplaced, rate, u_unknown_trend
+from acquisition.measure.drift import (
+    JUMP_U,
+    MIN_SIGNAL_U,
+    Drift,
+    is_misplaced,
+    rate,
+    u_unknown_trend,
+)
 from acquisition.measure.placement import Placement
 from instrument.config.rig import Rig
 from instrument.record.reading import Reading
@@ -92,5 +99,5 @@ def _lamp_change(tile: Reading, other: Reading, drifts: Sequence[Drift]) -> floa
     """Return the relative change of the lamp's output that may lie between two readings."""
     known = [abs(s.trend_per_s) for d in drifts for s in d.segments if s.times_s.size > 1]
     apart_s = abs(tile.time_s - other.time_s)
-    between = max(known) * apart_s if known else _COVERAGE * u_unknown_trend(apart_s)
+    between = max(known) * apart_s if known else JUMP_U * u_unknown_trend(apart_s)
     return between if tile.block == other.block else between + _NEXT_SETTING

@@ -14,7 +14,9 @@ from instrument.record.reading import Check, Reading
 
 MIN_SIGNAL_U = 10.0  # with less signal, in u, a check shows noise and not the lamp
 JUMP_U, MIN_JUMP = 4.0, 0.003  # a jump exceeds both: in u, and relative
-_WARM_UP_PER_S, _WARM_UP = 1.0 / 3600.0, 0.02  # at most, before two checks show a trend (assumed)
+# Changes of a lamp that warms up, before two checks show a trend: at once, per s, and at most
+# (assumed).
+_WARM_UP_STEP, _WARM_UP_PER_S, _WARM_UP = 0.005, 1.0 / 3600.0, 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,10 +210,10 @@ class Drift:
 def u_unknown_trend(apart_s: float) -> float:
     """Return the standard uncertainty of a lamp's relative level after a time, trend unknown.
 
-    A lamp that warms up may change by four times as much (`JUMP_U`): 1.7 % a minute, and 2 %
-    between two checks. What changes more has jumped, or is not warm enough to measure with.
+    A lamp that warms up may change by four times as much (`JUMP_U`): 0.5 %, 1.7 % more a minute,
+    and 2 % in all. What changes more has jumped, or is not warm enough to measure with.
     """
-    return min(_WARM_UP_PER_S * abs(apart_s), _WARM_UP) / JUMP_U
+    return min(_WARM_UP_STEP + _WARM_UP_PER_S * abs(apart_s), _WARM_UP) / JUMP_U
 
 
 def is_usable(check: Reading) -> bool:
