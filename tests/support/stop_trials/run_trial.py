@@ -17,10 +17,11 @@ from drivers.lines import device_lock
 from tests.support.stop_trials.bench import Bench
 from tests.support.stop_trials.files import arguments, next_arguments, write_files
 from tests.support.stop_trials.program import Program
-from tests.support.stop_trials.trial import BEFORE_FIRST_S, ENDS_NO_PROGRAM, ON_DISK, Trial
+from tests.support.stop_trials.trial import BEFORE_FIRST_S, ENDS_NO_PROGRAM, GOES_ON, ON_DISK, Trial
 
 ENDS_WITHIN_S = 20.0  # after the signal, and after the fault has gone
 _REST_S = 20.0  # for an axis whose program is frozen or dead
+_GIVES_UP_S = 5.0  # for a scan that has lost the port
 _NEXT_S = 3.0  # for the next motion of a scan whose disk hangs
 _TICK_S = 0.02
 
@@ -127,7 +128,7 @@ class _Course:
         trial, seen = self._trial, self._seen
         begun_s = self._begin_fault()
         if trial.signal:
-            if trial.fault in ("unplugged", "frozen"):
+            if trial.fault in GOES_ON:
                 ahead_s = min(trial.ahead_s, trial.seconds / 2)
             else:
                 ahead_s = trial.ahead_s if trial.fault in ("noise", "lost answers") else 0.0
@@ -186,9 +187,10 @@ class _Course:
         elif trial.fault in ON_DISK:
             self._wait_until(self._hung_s + trial.seconds)
             self._disk.close()
-        if not trial.signal and trial.command == "run" and trial.fault == "frozen":
-            self._wait_until(seen.reachable_s + trial.ahead_s)  # the scan may go on
-            seen.struck_s = seen.reachable_s = program.strike("SIGTERM")
+        if not trial.signal and trial.command == "run" and trial.fault in GOES_ON:
+            after_s = trial.ahead_s if trial.fault == "frozen" else _GIVES_UP_S
+            if not program.await_end(seen.reachable_s + after_s):  # the scan goes on
+                seen.struck_s = seen.reachable_s = program.strike("SIGTERM")
         program.await_end(time.monotonic() + ENDS_WITHIN_S)
         seen.code, seen.ended_s, seen.text = program.code, program.ended_s, program.text
         seen.waits = program.waits

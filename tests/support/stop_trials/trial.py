@@ -18,6 +18,7 @@ FAULTS = (
     "dropped terminal", "unplugged", "frozen", "hung disk", "lost byte",
 )  # fmt: skip
 ENDS_NO_PROGRAM = ("killed", "frozen for ever")
+GOES_ON = ("frozen", "unplugged")  # the command may go on once the fault is over
 ON_DISK = ("hung disk", "held record")
 
 
@@ -116,7 +117,7 @@ def _signal(rng: random.Random, fault: str) -> str:
         return ""
     if fault == "dropped terminal":
         return "terminal"
-    if fault in ("unplugged", "frozen") and rng.random() < 0.5:
+    if fault in GOES_ON and rng.random() < 0.5:
         return ""
     return rng.choice(SIGNALS)
 
