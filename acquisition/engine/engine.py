@@ -262,8 +262,7 @@ class Engine:
             reading = self._measure(exposed)
             doubt = self._references.doubt(reading)
         if doubt:
-            check = self._references.failed_check(reading)
-            if check is not None:
+            for check in self._references.failed_checks(reading):
                 self._record.add_check(check)
             raise Interlock(f"{doubt}; {what_to_look_at(reading)}")
         self._references.accept(reading)

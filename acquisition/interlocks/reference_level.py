@@ -53,27 +53,24 @@ def level_doubt(reading: Reading, rig: Rig) -> str:
     return ""
 
 
-def angle_doubt(
-    tile: Reading, others: Sequence[Reading], drifts: Mapping[int, Drift], rig: Rig
-) -> str:
+def angle_doubt(tile: Reading, other: Reading, drifts: Mapping[int, Drift], rig: Rig) -> str:
     """Return why a reading of the tile contradicts an earlier one, empty if it does not.
 
     `drifts`: of the lamp, by block.
     """
-    for other in others:
-        if other.flags or not other.signal_dn > 0:
-            continue
-        own = [drifts[r.block] for r in (tile, other)]
-        found, expected = _ratio(tile, other, own), _cosine(tile) / _cosine(other)
-        allowed = math.hypot(_allowed(tile, rig), _allowed(other, rig))
-        allowed += _lamp_change(tile, other, own)
-        if abs(math.log(found / expected)) > allowed:
-            return (
-                f"white tile at theta_i {tile.theta_i_deg:g} deg: {found:.3g} times the light at "
-                f"{other.theta_i_deg:g} deg; expected by the cosine law: {expected:.3g} within "
-                f"{100 * allowed:.2g} %"
-            )
-    return ""
+    if other.flags or not other.signal_dn > 0:
+        return ""
+    own = [drifts[r.block] for r in (tile, other)]
+    found, expected = _ratio(tile, other, own), _cosine(tile) / _cosine(other)
+    allowed = math.hypot(_allowed(tile, rig), _allowed(other, rig))
+    allowed += _lamp_change(tile, other, own)
+    if abs(math.log(found / expected)) <= allowed:
+        return ""
+    return (
+        f"white tile at theta_i {tile.theta_i_deg:g} deg: {found:.3g} times the light at "
+        f"{other.theta_i_deg:g} deg; expected by the cosine law: {expected:.3g} within "
+        f"{100 * allowed:.2g} %; both settings are measured again"
+    )
 
 
 def _ratio(tile: Reading, other: Reading, drifts: Sequence[Drift]) -> float:

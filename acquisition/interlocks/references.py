@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from acquisition.interlocks.lamp_checks import check_text, compared, failed
 from acquisition.interlocks.reference_level import angle_doubt, level_doubt
-from acquisition.measure.drift import Drift
+from acquisition.measure.drift import Drift, rate
 from instrument.config.rig import Rig
 from instrument.record.reading import Check, Reading
 
@@ -47,23 +47,38 @@ class References:
                 return f"drift check: {check_text(check)}"
         if level := level_doubt(reading, self.rig):
             return f"light: {level}"
-        angle = self._angle_doubt(reading)
+        _, angle = self._contradicting(reading)
         return f"lamp angle: {angle}" if angle else ""
 
-    def failed_check(self, reading: Reading) -> Check | None:
-        """Return the check that makes earlier readings of the block doubtful, None if none is."""
-        if reading.kind == "drift" or self._angle_doubt(reading):
-            check = compared(reading, self.readings, self.checks, reading.step)
-            check = replace(check, jumped=check.jumped and reading.kind == "drift")
-            return check if failed(check) else None
-        return None
+    def failed_checks(self, reading: Reading) -> list[Check]:
+        """Return the checks to record, which make earlier readings doubtful.
 
-    def _angle_doubt(self, reading: Reading) -> str:
+        Where two readings of the tile contradict one another either may be wrong, and with it all
+        that was measured at its setting of the lamp.
+        """
+        other, _ = self._contradicting(reading)
+        if reading.kind == "drift":
+            made = [compared(reading, self.readings, self.checks, reading.step)]
+            return [check for check in made if failed(check)]
+        both = [] if other is None else [other, reading]
+        return [
+            Check(
+                before_step=reading.step, expected=rate(tile), u_expected=0.0, jumped=False,
+                reading=replace(tile, time_s=reading.time_s, free_s=reading.free_s),
+            )
+            for tile in both
+        ]  # fmt: skip
+
+    def _contradicting(self, reading: Reading) -> tuple[Reading | None, str]:
+        """Return an earlier reading of the tile that contradicts one, and how; None and empty."""
         if reading.kind != "tile" or reading.flags or level_doubt(reading, self.rig):
-            return ""
+            return None, ""
         blocks = {r.block for r in (*self.readings, reading)}
         drifts = {block: Drift.of(self.readings, block, self.checks) for block in blocks}
-        return angle_doubt(reading, self._comparable(reading), drifts, self.rig)
+        for other in self._comparable(reading):
+            if text := angle_doubt(reading, other, drifts, self.rig):
+                return other, text
+        return None, ""
 
     def _comparable(self, tile: Reading) -> list[Reading]:
         """Return the readings of the tile by the same lamp, or one that drift checks connect."""
