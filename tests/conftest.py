@@ -84,14 +84,29 @@ def remote(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RemoteCamera]:
 @pytest.fixture(scope="session")
 def recorder(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """The environment in which a process's writes are recorded: see `write_recorder.c`."""
+    return {"LD_PRELOAD": _preloaded("write_recorder", tmp_path_factory)}
+
+
+@pytest.fixture(scope="session")
+def hung_disk(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The environment in which a disk hangs while a file is there: see `hung_disk.c`."""
+    flag = tmp_path_factory.mktemp("disk") / "hung"
+    return {
+        "LD_PRELOAD": _preloaded("hung_disk", tmp_path_factory),
+        "GONIO_HUNG_DISK": str(flag),
+    }
+
+
+def _preloaded(name: str, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Compile a library of `support/storage` and return its path."""
     compiler = shutil.which("cc")
     if compiler is None:
-        pytest.skip("no C compiler: the write recorder cannot be made (Debian: gcc, libc6-dev)")
-    library = tmp_path_factory.mktemp("recorder") / "write_recorder.so"
-    source = Path(__file__).with_name("support") / "storage" / "write_recorder.c"
+        pytest.skip(f"no C compiler: {name} cannot be made (Debian: gcc, libc6-dev)")
+    library = tmp_path_factory.mktemp(name) / f"{name}.so"
+    source = Path(__file__).with_name("support") / "storage" / f"{name}.c"
     options = ["-O1", "-Wall", "-Werror", "-shared", "-fPIC"]
     subprocess.run([compiler, *options, "-o", library, source, "-ldl"], check=True, timeout=60)
-    return {"LD_PRELOAD": str(library)}
+    return str(library)
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ import select
 import signal
 import sys
 import time
+from types import FrameType
 
 from instrument.errors import OperatorStop
 
@@ -29,6 +30,8 @@ STOPS: dict[int, str] = {
 """Signals that end the command, with the text of the event in the record."""
 HEARD = 0
 """Byte for the stop thread: the main thread has seen the signal. No signal has this number."""
+AGAIN = 128
+"""Added to the number of a signal, for the stop thread: send it again, a little later."""
 _WAKE = signal.SIGRTMIN  # ends a system call of the main thread, and means nothing else
 _SHOW_CURSOR = "\x1b[?25h\n"  # DECTCEM of the VT220 (DEC): a progress display hides it
 
@@ -66,7 +69,13 @@ def begin() -> None:
 
 
 def ended(exit_code: int) -> None:
-    """Let a signal change nothing any more: the command is done, and so is its output."""
+    """Let a signal change nothing any more: the command is done, and so is its output.
+
+    Python kills itself by a SIGINT in the end if a `KeyboardInterrupt` once left the code of a
+    string, as a named tuple has, caught since or not; other such code makes it forget that (CPython
+    3.11, run_eval_code_obj and exit_sigint).
+    """
+    exec("")
     _state.exit_code, _state.begun = exit_code, False
 
 
@@ -128,7 +137,7 @@ def say(text: str) -> None:
         return
 
 
-def _on_signal(number: int, frame: object) -> None:  # noqa: ARG001 - a signal handler's form
+def _on_signal(number: int, frame: FrameType | None) -> None:
     now_s = time.monotonic()
     soon, _state.last_s = now_s - _state.last_s < STOPPING_S, now_s
     if _state.heard_fd >= 0:
@@ -140,6 +149,9 @@ def _on_signal(number: int, frame: object) -> None:  # noqa: ARG001 - a signal h
         os._exit(_state.exit_code)
     if not _state.orderly:
         end_at_once(_state.reason)
+    if frame is not None and frame.f_code is _on_unraisable.__code__:
+        _send_again()
+        return
     raise KeyboardInterrupt(_state.reason)
 
 
@@ -148,10 +160,12 @@ def _on_unraisable(unraisable: sys.UnraisableHookArgs) -> None:
     if not issubclass(unraisable.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(unraisable)
         return
-    from threading import Timer
+    _send_again()
 
+
+def _send_again() -> None:
     _state.last_s = -math.inf
-    Timer(0.0, os.kill, (os.getpid(), _state.number)).start()  # from here it would end likewise
+    os.write(_state.heard_fd, bytes([AGAIN | _state.number]))
 
 
 def _ignore() -> None:

@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from functools import cache
 
 from acquisition.terminal.stop_signals import (
+    AGAIN,
     HEARD,
     STOPPING_S,
     STOPS,
@@ -32,6 +33,7 @@ _HUNG = (
     "The program waits for a disk or a device and cannot end. What is recorded is safe. Stop it "
     "once more to end it as it is: the lamp may stay lit"
 )
+_AGAIN_S = 0.01  # for the main thread to come to where an exception can be raised
 _axes: list[_AxisThread] = []
 
 
@@ -116,6 +118,9 @@ def _serve(reading: int, main: int) -> None:
                 first, since_s = first or number, since_s if first else time.monotonic()
             elif number == HEARD:
                 first = 0
+            elif number & AGAIN:
+                time.sleep(_AGAIN_S)
+                os.kill(os.getpid(), number & ~AGAIN)
 
 
 def _stop_axes() -> None:
