@@ -43,8 +43,10 @@ class StopMonitor:
 
     def stands(self, now: Status | None, before_s: float, after_s: float) -> bool:
         """True once two answers report rest at one place; each came between the two times."""
-        if now is None or now.moving:
-            self._rest, self._moved = None, self._moved or now is not None
+        if now is None:
+            return False
+        if now.moving:
+            self._rest, self._moved = None, True
             return False
         tolerance = self._limits.tolerance_deg
         if self._rest is None or abs(now.position_deg - self._rest[0]) > tolerance:

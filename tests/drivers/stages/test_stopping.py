@@ -5,8 +5,10 @@ In simulated time over controllers in memory, so that each byte of each stop can
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
@@ -249,6 +251,40 @@ def test_a_move_whose_command_was_lost_is_sent_again_however_late_it_is_waited_f
     found.clock.sleep(8.0)
     assert stage.wait() == pytest.approx(5.0, abs=0.01)
     assert found.moves() == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", SERIAL)
+def test_a_stop_that_returns_has_ended_the_motion_whatever_the_line_does(
+    kind: str, slow: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Requests and answers are lost, cut and spoilt, by a share that differs from stop to stop."""
+    rng = random.Random(16)
+    number = 1000 if slow else 12
+    reports: list[str] = []
+    for _ in range(number):
+        found, stage = slow_stage(kind, monkeypatch, ramp=rng.choice([8.0, 40.0, 400.0]))
+        under_way(found, stage, rng.choice(["moving", "homing"]))
+        share = rng.choice([0.0, 0.1, 0.2, 0.4, 0.8])
+        found.wire.spoil_request = partial(_spoilt, rng, share)
+        found.wire.spoil = partial(_spoilt, rng, share)
+        try:
+            stage.stop()
+        except DeviceError as error:
+            reports.append(str(error))
+        else:
+            assert not still_moves(found)
+    assert all("may still move" in report for report in reports)
+    assert 0 < len(reports) < number
+
+
+def _spoilt(rng: random.Random, share: float, data: bytes) -> bytes:
+    if rng.random() >= share:
+        return data
+    cut = rng.randrange(len(data))
+    return rng.choice(
+        [b"", data[:cut], data[:cut] + data[cut + 1 :], bytes(0x80 | b for b in data)]
+    )
 
 
 def test_rest_is_believed_only_once_a_move_can_no_longer_begin() -> None:
