@@ -142,7 +142,9 @@ class _Course:
         trial, bench = self._trial, self._bench
         match trial.fault:
             case "lost byte" | "garbled byte":
-                bench.ask("spoil", fault=trial.fault, at=trial.at, back=trial.back)
+                bench.ask(
+                    "spoil", fault=trial.fault, at=trial.at, back=trial.back, times=trial.times
+                )
             case "lost answers":
                 bench.ask("lose answers", seconds=trial.seconds)
             case "noise":

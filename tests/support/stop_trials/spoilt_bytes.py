@@ -29,12 +29,13 @@ class Spoiling:
     _change: Callable[[bytes, int, int], bytes] | None = None
     _spoils_back: bool = False
     _stopped: bool = False
+    _left: int = 0
     _mute_until_s: float = 0.0
 
-    def spoil(self, fault: str, at: float, back: bool) -> None:
-        """Lose, or change, one byte at this part of the length of the next stop.
+    def spoil(self, fault: str, at: float, back: bool, times: int) -> None:
+        """Lose, or change, one byte at this part of the length of each of the next stops.
 
-        `back`: of the first answer after it.
+        `back`: of the answers after the first one.
         """
 
         def changed(data: bytes, begin: int, end: int) -> bytes:
@@ -42,7 +43,7 @@ class Spoiling:
             kept = b"" if fault == "lost byte" else bytes([data[index] ^ 0x15])
             return data[:index] + kept + data[index + 1 :]
 
-        self._change, self._spoils_back = changed, back
+        self._change, self._spoils_back, self._left = changed, back, times
 
     def _place(self, data: bytes) -> tuple[int, int]:
         """Return where the message begins and ends that holds the stop."""
@@ -60,19 +61,23 @@ class Spoiling:
         """Return what reaches the controller."""
         if self.stop in data:
             self._stopped = True
-            if self._change is not None and not self._spoils_back:
-                change, self._change = self._change, None
-                data = change(data, *self._place(data))
+            if not self._spoils_back:
+                data = self._spoilt(data, *self._place(data))
         self.log.append((time.monotonic(), "in", data))
         return data
+
+    def _spoilt(self, data: bytes, begin: int, end: int) -> bytes:
+        if self._change is None or self._left == 0:
+            return data
+        self._left -= 1
+        return self._change(data, begin, end)
 
     def back(self, answer: bytes) -> bytes:
         """Return what reaches the program."""
         if not answer:
             return b""
-        if self._change is not None and self._spoils_back and self._stopped:
-            change, self._change = self._change, None
-            answer = change(answer, 0, len(answer))
+        if self._spoils_back and self._stopped:
+            answer = self._spoilt(answer, 0, len(answer))
         kept = b"" if time.monotonic() < self._mute_until_s else answer
         self.log.append((time.monotonic(), "out" if kept else "lost", answer))
         return kept

@@ -19,8 +19,10 @@ class Outcome:
 
 
 def exceptions(outcomes: Sequence[Outcome]) -> list[str]:
-    """Return a line for each exception."""
-    return [f"{o.trial.name}: {text}" for o in outcomes for text in o.verdict.exceptions]
+    """Return a line for each exception, and for each trial of which a busy machine made nothing."""
+    busy = "the machine was too busy: run it again"
+    texts = [(o, (*o.verdict.exceptions, *[busy] * (o.verdict.how == "busy"))) for o in outcomes]
+    return [f"{outcome.trial.name}: {text}" for outcome, found in texts for text in found]
 
 
 def tree(outcomes: Sequence[Outcome]) -> str:

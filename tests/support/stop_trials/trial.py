@@ -29,7 +29,8 @@ class Trial:
     `signal` is empty where only the fault itself may end the command. `moment` is a part of the
     motion's duration at which the signal is sent, or the fault begins where it comes without one;
     `number` of the motion, counted from 1; in a scan whose disk hangs, of the one before. `back`:
-    the byte is one of the first answer after the stop.
+    the byte is one of the first answer after the stop. `times`: of so many messages; the program
+    sends a stop twice at once.
     `ahead_s` is how long before a signal its fault begins. `at` is the place in a message, as a
     part of its length, and `seconds` the duration of a fault, infinite where it stays.
     """
@@ -44,6 +45,7 @@ class Trial:
     ahead_s: float
     at: float
     back: bool
+    times: int
     seconds: float
     real_start: bool
     at_once: bool
@@ -85,6 +87,7 @@ def draw(seed: int) -> Trial:
         ahead_s=rng.choice((0.0, rng.uniform(0.0, 0.05), rng.uniform(0.0, 0.5))),
         at=rng.random(),
         back=rng.random() < 0.25,
+        times=rng.choice((1, 2)),
         seconds=_seconds(rng, fault),
         real_start=command != "run" and rng.random() < 0.12,
         at_once=rng.random() < 0.5,

@@ -24,6 +24,8 @@ _ENDED = "all motion has ended"
 class Verdict:
     """Verdict: `how` is stood, said, ended (by itself, with 0), or for a dead program finished.
 
+    busy: it stood late, and the machine kept it waiting for that long; that proves nothing.
+
     `after_s`: from the moment at which a stop was possible to the standstill; `late_s`: for how
     long the machine kept devices and program waiting within it. `moved`: the axis was moving when
     it was struck.
@@ -47,11 +49,11 @@ def verdict(trial: Trial, seen: Seen) -> Verdict:
         wrong += [*_unfinished(seen), *_not_told(trial, seen)]
         return Verdict("finished", tuple(wrong), moved=moved)
     after_s, braking_s, late_s = _standstill(trial, seen)
-    in_time = after_s <= STANDS_WITHIN_S + braking_s + late_s
+    in_time = after_s <= STANDS_WITHIN_S + braking_s
     if seen.code == 0 and _arrived(seen) and (in_time or not trial.signal):
         return Verdict("ended", tuple(wrong), moved=moved)
-    said = says_that_it_may_move(seen.text)
-    if not in_time and not said:
+    how = "stood" if in_time else "said" if says_that_it_may_move(seen.text) else "busy"
+    if how == "busy" and after_s > STANDS_WITHIN_S + braking_s + late_s:
         wrong.append(
             f"stood after {after_s:.2f} s (braking {braking_s:.2f} s, waited {late_s:.2f} s), and "
             "no line says so"
@@ -60,7 +62,6 @@ def verdict(trial: Trial, seen: Seen) -> Verdict:
         wrong.append(f"moves when the command has said: {seen.text[-300:]!r}")
     if math.isinf(trial.seconds) and _ENDED in seen.text:
         wrong.append(f"says what it cannot have read: {seen.text[-300:]!r}")
-    how = "stood" if in_time else "said"
     return Verdict(how, tuple(wrong), after_s, braking_s, late_s, moved)
 
 

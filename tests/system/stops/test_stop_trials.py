@@ -82,6 +82,11 @@ def waits(*waited_s: float) -> list[tuple[float, dict[str, float]]]:
 TRIAL = replace(draw(0), command="home", motion="homing", fault="none", signal="SIGINT")
 
 
+def test_a_late_stop_on_a_busy_machine_proves_nothing() -> None:
+    late = seen(STOPPED_LATE, "", waits=waits(0.1, 0.5, 0.6))
+    assert verdict(TRIAL, late).how == "busy"
+
+
 @pytest.mark.parametrize(
     ("what", "exception"),
     [
