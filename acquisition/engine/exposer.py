@@ -13,6 +13,7 @@ from acquisition.engine.exposure_check import ExposureCheck
 from acquisition.engine.exposure_search import ExposureSearch
 from acquisition.engine.retrying_camera import RetryingCamera
 from acquisition.interlocks.darks import REFERENCE_FRAMES, DarkCheck, Excess
+from acquisition.interlocks.doubt import doubt_text
 from acquisition.interlocks.picture.outline_check import OutlineCheck
 from acquisition.interlocks.picture.swap import SwapCheck
 from acquisition.measure.hot_pixels import hot_pixel_text
@@ -25,12 +26,16 @@ from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
 from instrument.devices import Frame, Lamp, Surface
 from instrument.errors import DeviceError, Interlock
-from instrument.record.event_kinds import HOT, OPERATOR
+from instrument.record.event_kinds import HOT, INTERLOCK, OPERATOR
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 
 log = logging.getLogger("acquisition.interlocks")
 
+_MEASURED_AGAIN = (
+    "Once that is in order, gonio resume goes on, and measures again what was measured since the "
+    "last picture without this fault"
+)
 _LOOK_FOR_LIGHT = (
     "light reaches the camera although the lamp is darkened: look at its shutter or lid, and for "
     "light of the room"
@@ -118,26 +123,28 @@ class Exposer:
 
     def _require_swapped(self, first: Frame, step: Step) -> None:
         """Raise `Interlock` if a reference shows the surface that should have been taken away."""
-        if step.kind != "point" and (
-            text := self._swap.contradiction(first, step.surface, step.pose)
-        ):
-            raise Interlock(f"{text}. gonio resume goes on")
+        text = self._swap.contradiction(first, step)
+        if text:
+            self._put_in_doubt(self._swap.doubted)
+            raise Interlock(f"{text}. {_MEASURED_AGAIN}")
 
     def _at_its_place(self, first: Frame, step: Step) -> Frame:
         """Return a first frame that shows the surface where the pose puts it, or a second one."""
-        text = self._outline.contradiction(first.image, step.surface, step.pose.theta_r)
+        text = self._outline.contradiction(first.image, step)
         if not text:
             return first
         second = self.camera.grab(1)[0]
-        still = self._outline.contradiction(second.image, step.surface, step.pose.theta_r)
+        still = self._outline.contradiction(second.image, step)
         if still:
-            raise Interlock(
-                f"{still}. Seen in two frames of step {step.index}. What was measured since it "
-                "happened is wrong too: gonio resume goes on if it has just happened, else start "
-                "a new run"
-            )
+            self._put_in_doubt(self._outline.doubted)
+            raise Interlock(f"{still}. Seen in two frames of step {step.index}. {_MEASURED_AGAIN}")
         log.warning("%s. A second frame shows it at its place, and counts", text)
         return second
+
+    def _put_in_doubt(self, steps: Sequence[int]) -> None:
+        if steps:
+            text = doubt_text(steps, self.scan_s())
+            self.record.add_event(self.clock.utc().isoformat(), INTERLOCK, text)
 
     def scan_s(self) -> float:
         """Return the scan time: seconds since its start, without interruptions."""

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from acquisition.interlocks.doubt import doubted_steps
 from acquisition.interlocks.lamp_checks import compared, doubtful_steps
 from acquisition.measure.drift import is_usable
 from acquisition.plan.plan import Plan, Step
@@ -18,20 +19,26 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Readings of a stopped scan in the plan's order, and its earlier drift checks."""
+    """Readings of a stopped scan in the plan's order, and its earlier drift checks.
+
+    doubted: steps whose surface was not proved to be at its place.
+    """
 
     readings: tuple[Reading, ...] = ()
     checks: tuple[Check, ...] = ()
+    doubted: frozenset[int] = frozenset()
 
     @classmethod
     def of(cls, record: Record) -> Progress:
         """Return the progress of the scan in a record."""
-        return cls(tuple(record.readings()), tuple(record.checks()))
+        readings = tuple(record.readings())
+        doubted = doubted_steps(readings, record.events())
+        return cls(readings, tuple(record.checks()), doubted)
 
     @property
     def doubtful(self) -> frozenset[int]:
-        """Indices of accepted steps to be measured again: the next drift check failed."""
-        return doubtful_steps(self.readings, self.checks)
+        """Indices of accepted steps to be measured again: the next proof failed."""
+        return doubtful_steps(self.readings, self.checks) | self.doubted
 
     @property
     def done(self) -> frozenset[int]:

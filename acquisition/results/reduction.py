@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from acquisition.interlocks.doubt import DOUBTED, doubted_steps
 from acquisition.interlocks.lamp_checks import UNPROVEN, doubtful_steps
 from acquisition.interlocks.no_light import NO_SIGNAL, unlit_steps
 from acquisition.measure.drift import Drift, rate
@@ -109,7 +110,9 @@ def root_sum_square(parts: Sequence[FloatArray]) -> FloatArray:
 
 def reduced_run(record: Record, loaded: Loaded) -> Reduced:
     """Return radiance and BRDF of all points in a run's record, complete or not."""
-    return reduce(record.readings(), loaded.protocol, record.checks())
+    readings = record.readings()
+    doubted = doubted_steps(readings, record.events())
+    return reduce(readings, loaded.protocol, record.checks(), doubted)
 
 
 def require_usable(reduced: Reduced) -> None:
@@ -131,16 +134,26 @@ def require_usable(reduced: Reduced) -> None:
     )
 
 
-def reduce(readings: Sequence[Reading], protocol: Protocol, checks: Sequence[Check]) -> Reduced:
-    """Return radiance and BRDF of all points; `checks`: the lamp checks made at each resume."""
+def reduce(
+    readings: Sequence[Reading],
+    protocol: Protocol,
+    checks: Sequence[Check],
+    doubted: frozenset[int] = frozenset(),
+) -> Reduced:
+    """Return radiance and BRDF of all points; `checks`: the lamp checks made at each resume.
+
+    doubted: steps whose surface was not proved to be at its place.
+    """
     doubtful = doubtful_steps(readings, checks)
-    readings = [r for r in readings if r.kind != "drift" or r.step not in doubtful]
+    left_out = doubtful | doubted
+    readings = [r for r in readings if r.kind != "drift" or r.step not in left_out]
     points = tuple(r for r in readings if r.kind == "point")
     blocks = sorted({r.block for r in readings})
     drifts = {block: Drift.of(readings, block, checks) for block in blocks}
     doubts = {
         NO_SIGNAL: unlit_steps(readings),
         UNPROVEN: doubtful,
+        DOUBTED: doubted,
     }
     placements = _placements(sorted(readings, key=lambda r: r.time_s))
     tiles = {

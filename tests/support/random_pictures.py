@@ -9,11 +9,14 @@ import numpy as np
 
 from acquisition.interlocks.picture.outline import Deviation
 from acquisition.interlocks.picture.outline_check import U_TILT_DEG, OutlineCheck
+from acquisition.plan.plan import Step
+from acquisition.plan.pose import Pose
 from instrument.config.load import Loaded, load_protocol
 from instrument.config.protocol import PatchConfig, Protocol, Sample, SimulatedSample
 from instrument.config.rig import Rig
-from instrument.devices import Image
+from instrument.devices import Image, Surface
 from instrument.pinhole import Pinhole
+from instrument.record.reading import Kind
 from sim.defects.world import World
 from sim.scene.scene import Scene
 from sim.scene.sensor import Sensor
@@ -45,6 +48,14 @@ class Picture:
         self.scene.set_axis("theta_r", theta_r_deg)
         self.scene.true_deg["theta_r"] += slip_deg
         return replace(self, theta_r_deg=theta_r_deg)
+
+
+def step_at(surface: Surface, pose: Pose, index: int = 0, kind: Kind = "drift") -> Step:
+    """A step of a plan at this pose."""
+    return Step(
+        index=index, kind=kind, surface=surface, pose=pose, lamp_setting=0, block=0, frames=1,
+        expected_exposure_s=0.01,
+    )  # fmt: skip
 
 
 @cache

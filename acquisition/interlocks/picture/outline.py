@@ -205,6 +205,16 @@ class Comparison:
         """True if the surface cannot be where the pose puts it."""
         return len(self.edges) >= _LEAST_EDGES and self.chi2 > self.chi2_limit
 
+    @property
+    def slip_limit_deg(self) -> float:
+        """Least slip of theta_r that would contradict, in degrees; infinite if none would."""
+        if len(self.edges) < _LEAST_EDGES:
+            return float("inf")
+        by_deg = self._gradient[:, _NAMES.index("theta_r_deg")]
+        return float(
+            np.sqrt(self.chi2_limit / (by_deg @ np.linalg.solve(self.covariance_px2, by_deg)))
+        )
+
     def learnt(self) -> Estimate:
         """Return what is known of the deviation after this picture (Kalman 1960)."""
         known = self.outline.known

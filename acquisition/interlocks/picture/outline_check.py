@@ -23,6 +23,7 @@ from acquisition.interlocks.picture.outline import (
     Rectangle,
 )
 from acquisition.measure.radiometry import SATURATION_FRACTION
+from acquisition.plan.plan import Step
 from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
 from instrument.devices import Surface
@@ -35,7 +36,17 @@ U_FIELD = 0.01  # relative, of `field_width_mm`
 U_POSITION_MM = 1.0  # of a surface laid against marks by hand, at most: see `_u_position_mm`
 U_ROLL_DEG = 0.3  # of `roll_deg`, as seen in a picture by eye
 U_TILT_DEG = 0.2  # of the surface from the plane of the axis: 0.1 mm on its edge
+_CERTAIN = 0.7  # share of a slip from whose limit on it was certainly absent: limits are estimates
 U_AIM_MM = 0.2  # of the axis in the picture from one angle to another: a beam bends
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """Step without a contradiction: number of the placement, and least slip that would be one."""
+
+    step: int
+    placement: int
+    slip_limit_deg: float
 
 
 @dataclass(slots=True)
@@ -43,13 +54,17 @@ class OutlineCheck:
     """Interlock on the outlines of the surfaces whose size is known.
 
     u: standard uncertainties by surface. What the pictures tell of a surface's place and size, and
-    of the camera, counts until another surface takes its place.
+    of the camera, counts until another surface takes its place. doubted: after a contradiction,
+    steps before it in which it would not have been seen.
     """
 
     rig: Rig
     surfaces: Mapping[Surface, Rectangle]
     u: Mapping[Surface, Deviation]
+    doubted: list[int] = field(default_factory=list)
     _placed: Surface | None = None
+    _placements: int = 0
+    _seen: list[_Seen] = field(default_factory=list)
     _known: Estimate = field(default_factory=lambda: Estimate.of(Deviation()))
 
     @classmethod
@@ -73,16 +88,19 @@ class OutlineCheck:
         range_dn = camera.black_level_dn, SATURATION_FRACTION * camera.max_dn
         return Comparison(outline, find_edges(image, range_dn, outline.corners_px(), scale))
 
-    def contradiction(self, image: NDArray[Any], surface: Surface, theta_r_deg: float) -> str:
+    def contradiction(self, image: NDArray[Any], step: Step) -> str:
         """Return how an image (rows, columns) in DN contradicts the pose; empty if it does not."""
+        surface, theta_r_deg = step.surface, step.pose.theta_r
         if surface not in self.surfaces:
-            self._placed = None
+            self._place(surface, Estimate.of(Deviation()))
+            self._seen.append(_Seen(step.index, self._placements, float("inf")))
             return ""
         found = self.compare(image, surface, theta_r_deg)
         if not found.contradicts:
-            self._placed = surface
-            self._known = found.learnt() if found.edges else found.outline.known
+            self._place(surface, found.learnt() if found.edges else found.outline.known)
+            self._seen.append(_Seen(step.index, self._placements, found.slip_limit_deg))
             return ""
+        self.doubted = self._unseen_in(found, self._placements + (surface != self._placed))
         return (
             f"interlock outline: the {surface} ({found.outline.surface}) is not where theta_r "
             f"{theta_r_deg:g} deg puts it in the picture: {_edges_text(found)}; its angle, height, "
@@ -90,6 +108,25 @@ class OutlineCheck:
             f"{found.chi2:.3g}, allowed {found.chi2_limit:.3g}). "
             f"{self._explanation(found, surface)}"
         )
+
+    def _place(self, surface: Surface, known: Estimate) -> None:
+        self._placements += surface != self._placed
+        self._placed, self._known = surface, known
+
+    def _unseen_in(self, found: Comparison, placement: int) -> list[int]:
+        """Return the latest steps in which this contradiction would not have been seen.
+
+        A slip may be older than the placement of the surface, all else not.
+        """
+        at, _, chi2 = found.with_free("theta_r_deg")
+        slip_deg = abs(at.theta_r_deg) if chi2 <= found.chi2_limit else float("inf")
+        steps = []
+        for seen in reversed(self._seen):
+            older = seen.placement < placement
+            if seen.slip_limit_deg < _CERTAIN * slip_deg or (older and slip_deg == float("inf")):
+                break
+            steps.append(seen.step)
+        return steps
 
     def _explanation(self, found: Comparison, surface: Surface) -> str:
         """Return what explains the edges, and what to look at."""

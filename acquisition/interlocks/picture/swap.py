@@ -13,6 +13,7 @@ import numpy as np
 
 from acquisition.measure.radiometry import photon_transfer
 from acquisition.measure.rounding import rounding_u_dn
+from acquisition.plan.plan import Step
 from acquisition.plan.pose import Pose
 from instrument.config.camera import CameraConfig
 from instrument.devices import Frame, Surface
@@ -57,18 +58,31 @@ class _Seen:
 
 @dataclass(slots=True)
 class SwapCheck:
-    """Pictures of references by pose, of the surface on the table and of the one before it."""
+    """Pictures of references by pose, of the surface on the table and of the one before it.
+
+    doubted: steps of the surface before, after a contradiction: it may be the wrong one.
+    """
 
     camera: CameraConfig
+    doubted: list[int] = field(default_factory=list)
     _surface: Surface | None = None
+    _steps: list[int] = field(default_factory=list)
     _before: dict[Pose, _Seen] = field(default_factory=dict)
     _now: dict[Pose, _Seen] = field(default_factory=dict)
 
-    def contradiction(self, frame: Frame, surface: Surface, pose: Pose) -> str:
-        """Note a picture of a reference; return how it contradicts a swap, empty if it does not."""
+    def contradiction(self, frame: Frame, step: Step) -> str:
+        """Note a picture; return how that of a reference contradicts a swap, empty if it does not.
+
+        Points are only counted: there are too many to keep their pictures.
+        """
+        surface, pose = step.surface, step.pose
         if surface != self._surface:
             self._before, self._now = self._now, {}
+            self.doubted, self._steps = self._steps, []
             self._surface = surface
+        self._steps.append(step.index)
+        if step.kind == "point":
+            return ""
         seen = _Seen.of(frame, self.camera)
         self._now[pose] = seen
         if pose not in self._before or not self._before[pose].same(seen):

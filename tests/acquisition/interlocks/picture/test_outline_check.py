@@ -10,9 +10,11 @@ import pytest
 
 from acquisition.interlocks.picture.outline import CHI2_LIMITS, LIMIT_SIGMA, Deviation
 from acquisition.interlocks.picture.outline_check import OutlineCheck
+from acquisition.plan.plan import Step
+from acquisition.plan.pose import Pose
 from instrument.config.load import Loaded, load_protocol
 from instrument.config.protocol import References, WhiteTile
-from instrument.devices import Image
+from instrument.devices import Image, Surface
 from instrument.errors import Interlock
 from instrument.geometry import FloatArray
 from instrument.pinhole import Pinhole
@@ -20,11 +22,15 @@ from instrument.record.record import Record
 from sim.scene.scene import Scene
 from sim.scene.sensor import Sensor
 from tests.support.paths import CONFIGS
-from tests.support.random_pictures import Picture, random_picture
+from tests.support.random_pictures import Picture, random_picture, step_at
 from tests.support.scans import changed, small_scan
 from tests.support.whole_scans.stopped_scan import scan
 
 RIGS = {"bench_12bit": 0.005, "paper_1995": 0.01, "emulated": 0.0002}  # with an exposure in s
+
+
+def _step(surface: Surface, theta_r_deg: float, index: int = 0) -> Step:
+    return step_at(surface, Pose(45.0, 0.0, theta_r_deg), index)
 
 
 def _demo(rig: str) -> Loaded:
@@ -48,9 +54,9 @@ def _told(rig: str, said_deg: float, true_deg: float, before_deg: Sequence[float
     sensor, check = Sensor(scene), OutlineCheck.of(loaded.rig, loaded.protocol)
     for angle in before_deg:
         scene.set_axis("theta_r", angle)
-        assert check.contradiction(sensor.picture(RIGS[rig]), "sample", angle) == ""
+        assert check.contradiction(sensor.picture(RIGS[rig]), _step("sample", angle)) == ""
     scene.set_axis("theta_r", true_deg)
-    return check.contradiction(sensor.picture(RIGS[rig]), "sample", said_deg)
+    return check.contradiction(sensor.picture(RIGS[rig]), _step("sample", said_deg))
 
 
 def test_random_pictures_without_a_fault_raise_no_alarm(slow: bool) -> None:
@@ -61,7 +67,7 @@ def test_random_pictures_without_a_fault_raise_no_alarm(slow: bool) -> None:
         check, angles = picture.check, np.random.default_rng(seed).uniform(-82, 82, 5)
         for angle in (picture.theta_r_deg, *angles.tolist()):
             image = picture.at(angle).take()
-            told.append(check.contradiction(image, "sample", angle))
+            told.append(check.contradiction(image, _step("sample", angle)))
     assert not [text for text in told if text]
 
 
@@ -133,7 +139,7 @@ def test_a_shifted_sample_is_told_as_such() -> None:
     moved = loaded.rig.camera.model_copy(update={"axis_column_px": 317.0 + 90})
     scene.rig = loaded.rig.model_copy(update={"camera": moved})
     check = OutlineCheck.of(loaded.rig, loaded.protocol)
-    text = check.contradiction(Sensor(scene).picture(0.005), "sample", 20.0)
+    text = check.contradiction(Sensor(scene).picture(0.005), _step("sample", 20.0))
     assert "off its place" in text
     assert float(text.split("A surface ")[1].split()[0]) == pytest.approx(10.8, abs=0.5)
 
@@ -151,8 +157,8 @@ def test_a_tile_left_on_the_table_is_told_by_its_size() -> None:
     scene.surface = "white tile"
     check = OutlineCheck.of(loaded.rig, loaded.protocol)
     picture = Sensor(scene).picture(0.002)
-    assert check.contradiction(picture, "white tile", 35.0) == ""
-    text = check.contradiction(picture, "sample", 35.0)
+    assert check.contradiction(picture, _step("white tile", 35.0)) == ""
+    text = check.contradiction(picture, _step("sample", 35.0))
     assert "The white tile (40 x 45 mm) would look like this: is it still on the table?" in text
 
 
@@ -161,7 +167,7 @@ def test_a_wrong_size_is_told_with_the_size_that_is_seen() -> None:
     scene = _scene(loaded, -10.0)
     scene.sample_size = scene.sample_size.model_copy(update={"height_mm": 35.0})
     check = OutlineCheck.of(loaded.rig, loaded.protocol)
-    text = check.contradiction(Sensor(scene).picture(0.005), "sample", -10.0)
+    text = check.contradiction(Sensor(scene).picture(0.005), _step("sample", -10.0))
     seen_mm = [float(word) for word in text.split("A surface of ")[1].split()[:3:2]]
     assert seen_mm == pytest.approx([50.8, 35.0], abs=0.2)
     assert "would look like this: look what lies on the table" in text
@@ -175,8 +181,8 @@ def test_a_round_sample_is_told_how_to_go_on_and_can_be_left_out() -> None:
     check = OutlineCheck.of(loaded.rig, loaded.protocol)
     sample = loaded.protocol.sample.model_copy(update={"outline": "none"})
     unchecked = OutlineCheck.of(loaded.rig, changed(loaded, sample=sample).protocol)
-    assert unchecked.contradiction(picture, "sample", 0.0) == ""
-    text = check.contradiction(picture, "sample", 0.0)
+    assert unchecked.contradiction(picture, _step("sample", 0.0)) == ""
+    text = check.contradiction(picture, _step("sample", 0.0))
     assert text == "" or "outline: none" in text
 
 
@@ -216,3 +222,21 @@ def test_one_picture_with_a_hand_in_it_is_noted_and_the_next_counts(
 def test_a_deviation_keeps_the_order_of_its_fields() -> None:
     values = np.arange(13.0)
     assert Deviation.of(values).values.tolist() == values.tolist()
+
+
+@pytest.mark.parametrize(("slip_deg", "doubted"), [(5.0, [3, 4, 5]), (1.5, [0, 1, 2, 3, 4, 5, 6])])
+def test_pictures_that_would_not_have_shown_the_slip_are_in_doubt(
+    slip_deg: float, doubted: list[int]
+) -> None:
+    loaded = _demo("bench_12bit")
+    scene = _scene(loaded, 0.0)
+    sensor, check = Sensor(scene), OutlineCheck.of(loaded.rig, loaded.protocol)
+    angles = (-70.0, -50.0, -30.0, -8.0, -2.0, 2.0, 8.0)
+    for index, angle in enumerate(angles[: doubted[-1] + 1]):
+        scene.set_axis("theta_r", angle)
+        picture = sensor.picture(RIGS["bench_12bit"])
+        assert check.contradiction(picture, _step("sample", angle, index)) == ""
+    scene.set_axis("theta_r", 40.0 + slip_deg)
+    picture = sensor.picture(RIGS["bench_12bit"])
+    assert check.contradiction(picture, _step("sample", 40.0, 9))
+    assert sorted(check.doubted) == doubted

@@ -15,6 +15,7 @@ from sim.defects.world import World
 from sim.scene.scene import Scene
 from sim.scene.sensor import Sensor
 from tests.support.paths import CONFIGS
+from tests.support.random_pictures import step_at
 from tests.support.scans import changed, small_scan
 from tests.support.whole_scans.stopped_scan import scan
 
@@ -36,12 +37,16 @@ def _after_the_tile(
     sensor, check = Sensor(scene), SwapCheck(loaded.rig.camera)
     scene.surface = "white tile"
     taken_s = RIGS[rig]
-    told = [check.contradiction(Frame(sensor.picture(taken_s), taken_s, 0.0), "white tile", POSE)]
+    told = [
+        check.contradiction(
+            Frame(sensor.picture(taken_s), taken_s, 0.0), step_at("white tile", POSE)
+        )
+    ]
     if world is None:
         scene.surface = "sample"
     scene.world, scene.step = world or World(lamp=level), 1
     image = sensor.picture(taken_s / 2)
-    told.append(check.contradiction(Frame(image, taken_s / 2, 0.0), "sample", POSE))
+    told.append(check.contradiction(Frame(image, taken_s / 2, 0.0), step_at("sample", POSE)))
     assert told[0] == ""
     return told[1]
 
