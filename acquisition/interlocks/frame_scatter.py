@@ -72,7 +72,7 @@ class Scatter:
 def frame_scatter(
     frames: Sequence[Frame], signal: Signal, dark: Dark, window: Window, rig: Rig
 ) -> Scatter:
-    """Return the scatter of the window's mean over two frames or more."""
+    """Return the scatter of the window's mean; a single frame has none, and no freedom."""
     window, _ = without_hot_pixels(window, dark.hot)
     total, squares = float(window.weights.sum()), float(np.vdot(window.weights, window.weights))
     level_dn = rig.camera.black_level_dn + max(signal.signal_dn, 0.0) / total
@@ -87,6 +87,8 @@ def frame_scatter(
 
 def _deviations_dn(frames: Sequence[Frame], window: Window) -> FloatArray:
     """Return the deviation of each frame's window mean from the mean of all, (frames,) in DN."""
+    if len(frames) == 1:
+        return np.zeros(1)
     first = frames[0].image[window.crop].astype(np.float32)
     weights = window.weights.astype(np.float32)
     means, change = [0.0], np.empty_like(first)
@@ -103,6 +105,8 @@ def _limit(freedom: int, sigma: float) -> float:
     Wilson and Hilferty 1931: the cube root of chi-squared is nearly normal; at one degree of
     freedom the limit is a fifth too large.
     """
+    if not freedom:
+        return 0.0
     part = 2 / (9 * freedom)
     return float(freedom * (1 - part + sigma * math.sqrt(part)) ** 3)
 
@@ -111,8 +115,9 @@ def _limit(freedom: int, sigma: float) -> float:
 class FrameScatter:
     """Judge of the readings of one scan; `note` records what was found.
 
-    A single bad frame spoils one reading. Where the last readings without the worst of them
-    scatter too much all together, the lamp or the camera is unsteady.
+    A single bad frame spoils one reading; a reading of one frame has the flicker of the others.
+    Where the last readings without the worst of them scatter too much all together, the lamp or the
+    camera is unsteady.
     """
 
     rig: Rig
@@ -126,10 +131,11 @@ class FrameScatter:
 
         Raises `Interlock` where it is not the first such reading.
         """
-        if len(frames) < 2 or not signal.window_pixels > 0:
+        if not signal.window_pixels > 0 or not (self._recent or len(frames) > 1):
             return signal
         found = frame_scatter(frames, signal, dark, window, self.rig)
-        self._recent.append(found)
+        if found.freedom:
+            self._recent.append(found)
         excess = self._excess_variance(found) / len(frames)
         if excess > 0:
             signal = replace(signal, u_noise_dn=math.hypot(signal.u_noise_dn, math.sqrt(excess)))
@@ -154,6 +160,8 @@ class FrameScatter:
         from scipy.special import chdtri
 
         last = self._without_worst()
+        if not last:
+            return 0.0
         freedom = sum(one.freedom for one in last)
         own = found.noise_ratio > _limit(found.freedom, _SEEN_SIGMA)
         all_of_them = sum(one.noise_ratio for one in last) > _limit(freedom, _SEEN_SIGMA)

@@ -126,6 +126,14 @@ def test_a_single_frame_has_nothing_to_compare() -> None:
     assert judged == signal
 
 
+def test_a_single_frame_has_the_flicker_of_the_readings_before_it() -> None:
+    bench = Bench(12, (60, 70), seed=3)
+    bench.signals(bench.frames(0.6 * (1 + np.array([0.003, -0.002, 0.001, -0.004]))))
+    signal, judged = bench.signals(bench.frames([0.3]))
+    assert judged.u_noise_dn == pytest.approx(0.003 * signal.signal_dn, rel=0.05)
+    assert judged.flags == ""
+
+
 def test_a_dark_reading_may_wander_by_a_part_of_a_count() -> None:
     """Black level that is regulated to 0.1 counts: u is raised, nothing is flagged."""
     bench = Bench(12, (60, 70))
