@@ -56,7 +56,8 @@ def grab_frame(
         open_rig.pose_scene(theta_r_deg)
         camera = open_rig.camera()
         frame, identity = _frame(camera, rig, window, target, exposure_s), camera.identity()
-    write_whole(path, _encoded(frame, window, rig, path.suffix))
+    with orderly_end():  # no half-written file stays
+        write_whole(path, _encoded(frame, window, rig, path.suffix))
     statistics = _statistics(frame, window, rig)
     _print_statistics(statistics, identity, path, as_json)
     for warning in _warnings(statistics, rig):
