@@ -14,6 +14,7 @@ from tests.support.stop_trials.trial import ENDS_NO_PROGRAM, MAX_DEG, MIN_DEG, T
 STANDS_WITHIN_S = 0.5  # promised, beyond the braking time
 CODES = (0, 3, 4)  # of the table of exit codes: the input of a trial is right
 TOLERANCE_DEG = 3 * U_DEG
+_KILLED = -9  # by SIGKILL
 _DELAY_S = 0.005  # a thread that wakes later than this was kept waiting by the machine
 # Lines by which a person knows that the axis may be moving.
 _MAY_MOVE = re.compile(r"LOOK AT THE RIG FIRST|may (still )?(be )?mov|still moves|may go on")
@@ -45,6 +46,8 @@ def verdict(trial: Trial, seen: Seen) -> Verdict:
     if math.isnan(seen.struck_s):
         return Verdict("ended", (*wrong, *_unasked_end(seen)))
     moved = _moved(seen)
+    if trial.fault in ENDS_NO_PROGRAM and seen.code != _KILLED:  # it was too late
+        return Verdict("ended", (*wrong, *_unasked_end(seen)))
     if trial.fault in ENDS_NO_PROGRAM:
         wrong += [*_unfinished(seen), *_not_told(trial, seen)]
         return Verdict("finished", tuple(wrong), moved=moved)
@@ -56,7 +59,7 @@ def verdict(trial: Trial, seen: Seen) -> Verdict:
     if how == "busy" and after_s > STANDS_WITHIN_S + braking_s + late_s:
         wrong.append(
             f"stood after {after_s:.2f} s (braking {braking_s:.2f} s, waited {late_s:.2f} s), and "
-            "no line says so"
+            f"no line says so: {seen.text[-400:]!r}"
         )
     if seen.at_end["moving"] and _ENDED in seen.text:
         wrong.append(f"moves when the command has said: {seen.text[-300:]!r}")
@@ -78,7 +81,7 @@ def _crashes(seen: Seen) -> list[str]:
     ):  # fmt: skip
         if "Traceback" in text:
             found.append(f"{name}: traceback: {text[-600:]!r}")
-        if code is not None and code not in CODES and code != -9:
+        if code is not None and code not in (*CODES, _KILLED):
             found.append(f"{name}: exit code {code}: {text[-300:]!r}")
     if seen.code is None:
         found.append(f"the command did not end: {seen.text[-300:]!r}")
