@@ -25,7 +25,7 @@ from instrument.clock import Clock
 from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
 from instrument.devices import Frame, Lamp, Surface
-from instrument.errors import DeviceError, Interlock
+from instrument.errors import DeviceError, Interlock, WrongRigFile
 from instrument.record.event_kinds import HOT, INTERLOCK, OPERATOR
 from instrument.record.reading import Reading
 from instrument.record.record import Record
@@ -106,7 +106,21 @@ class Exposer:
         self._start_s = self.running_s() - elapsed_s
 
     def expose(self, step: Step, window: Window) -> Exposed:
-        """Take all frames of a step, unsaturated if the camera's exposure range allows it."""
+        """Take all frames of a step, unsaturated if the camera's exposure range allows it.
+
+        Counts out of proportion to the exposures are taken again: the light may have changed. Only
+        a camera that is confirmed by then is not at fault.
+        """
+        try:
+            return self._expose(step, window)
+        except WrongRigFile as error:
+            log.warning("%s: measured again", error)
+            exposed = self._expose(step, window)
+            if exposed.frames[0].exposure_s not in self._check.confirmed:
+                raise
+            return exposed
+
+    def _expose(self, step: Step, window: Window) -> Exposed:
         guess_s = self._first_guess_s(step)
         tried = self._comparison(guess_s) + self._search.frames(guess_s, window)
         first = self._at_its_place(tried.pop(), step)

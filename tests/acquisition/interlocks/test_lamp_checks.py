@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,10 +14,12 @@ from acquisition.interlocks.references import References
 from acquisition.plan.plan import make_plan
 from acquisition.results.reduction import Reduced, reduce
 from instrument.config.load import Loaded
+from instrument.devices import Frame
 from instrument.errors import Interlock
 from instrument.record.reading import Check, Kind, Reading
 from instrument.record.record import Record
 from tests.support.scans import changed
+from tests.support.stand_ins import PassThrough
 from tests.support.whole_scans.lamp_faults import LampFault
 from tests.support.whole_scans.stopped_scan import scan
 
@@ -184,3 +189,22 @@ def test_a_strong_linear_drift_is_followed(small: Loaded, record: Record) -> Non
     loaded = changed(small, rig={"simulation": simulation})
     scan(loaded, record)
     assert not any(reduced(loaded, record).flags)
+
+
+@pytest.mark.parametrize("grab", [5, 6, 7, 8])
+def test_light_that_changes_between_two_exposures_is_no_fault_of_the_rig_file(
+    grab: int, small: Loaded, record: Record, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While the exposures of the first drift check are compared and searched for."""
+    fault = LampFault().install(monkeypatch)
+
+    class Watched(PassThrough):
+        calls = 0
+
+        def grab(self, count: int) -> list[Frame]:
+            self.calls += 1
+            fault.level = 0.6 if self.calls >= grab else 1.0
+            return self._device.grab(count)  # type: ignore[attr-defined,no-any-return]  # a camera
+
+    with suppress(Interlock):
+        scan(small, record, changed_devices=lambda d: replace(d, camera=Watched(d.camera)))  # type: ignore[arg-type]  # a stand-in
