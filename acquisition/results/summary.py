@@ -13,7 +13,7 @@ from analysis.report.data import Parameter
 from analysis.report.style import format_value
 from instrument.config.load import Loaded
 from instrument.geometry import FloatArray
-from instrument.record.event_kinds import EXPOSURE, RESUMED, RETRY
+from instrument.record.event_kinds import EXPOSURE, INTERLOCK, RESUMED, RETRY
 from instrument.record.record import Record
 
 Budget = tuple[tuple[str, float, float], ...]
@@ -108,6 +108,7 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         damage_text(record),
         _unfinished_note(record),
         _interruptions_note(record),
+        _interlock_note(record),
         fitted.reason if fitted.choice is not None else "",
         *(note.text for note in of_fit if note.code != NoteCode.SEARCH_END),
         paper_ratio_note(fitted.chosen) if fitted.chosen is not None else "",
@@ -169,12 +170,22 @@ def _interruptions_note(record: Record) -> str:
     kinds = [kind for _, kind, _ in record.events()]
     resumed, retries = kinds.count(RESUMED), kinds.count(RETRY)
     jumps = sum(check.jumped for check in record.checks())
+    times = "1 time" if jumps == 1 else f"{jumps} times"
     texts = (
         f"the scan was interrupted {resumed} times" if resumed else "",
-        f"the lamp level had jumped after {jumps} of them and is corrected" if jumps else "",
+        f"the lamp level had jumped {times} and is followed from there" if jumps else "",
         f"{retries} retries and warnings, see the events in the record" if retries else "",
     )
     return "; ".join(text for text in texts if text)
+
+
+def _interlock_note(record: Record) -> str:
+    """First of the things that contradicted the physics, and the number of all."""
+    found = list(dict.fromkeys(text for _, kind, text in record.events() if kind == INTERLOCK))
+    if not found:
+        return ""
+    more = f" ({len(found) - 1} more, see the events in the record)" if found[1:] else ""
+    return f"interlocks noted: {found[0]}{more}"
 
 
 def _drift_note(reduced: Reduced) -> str:

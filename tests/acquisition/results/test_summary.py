@@ -14,6 +14,8 @@ from acquisition.results.summary import budget, headline, notes, value_text
 from acquisition.rig import open_devices
 from analysis.report.data import Parameter
 from instrument.config.load import Loaded
+from instrument.record.event_kinds import INTERLOCK
+from instrument.record.reading import Check
 from instrument.record.record import Record
 from tests.support.scans import small_scan
 
@@ -75,3 +77,18 @@ def test_the_budget_shares_the_whole_variance(results: Results) -> None:
 )
 def test_a_parameter_has_its_u_or_its_interval(parameter: Parameter, text: str) -> None:
     assert value_text(parameter) == text
+
+
+def test_what_the_interlocks_noted_and_jumps_of_the_lamp_are_told(
+    results: Results, record: Record
+) -> None:
+    loaded, reduced, fitted, before = results
+    assert not any("interlocks noted" in note for note in before)
+    for text in ("dark at 0.1 s: +3 DN", "drift check: jumped", "drift check: jumped"):
+        record.add_event("", INTERLOCK, text)
+    jumped = Check(before_step=1, expected=1.0, u_expected=0.1, jumped=True,
+                   reading=reduced.points[0])  # fmt: skip
+    record.add_check(jumped)
+    found = notes(reduced, fitted, record, loaded)
+    assert "interlocks noted: dark at 0.1 s: +3 DN (1 more, see the events in the record)" in found
+    assert any("the lamp level had jumped 1 time and is followed from there" in n for n in found)
