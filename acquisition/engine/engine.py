@@ -205,7 +205,7 @@ class Engine:
         except NoPathError:
             return  # no path back, but there may be one from here to the next step
 
-    def _scan(self, plan: Plan, steps: Sequence[Step]) -> None:
+    def _measure_steps(self, plan: Plan, steps: Sequence[Step]) -> None:
         waiting = None
         for step in steps:
             self._begin_step(step.index, self._exposer.scan_s())
@@ -223,6 +223,17 @@ class Engine:
                 self._accept_reference(waiting)
                 waiting = None
         self._accept(waiting)
+
+    def _scan(self, plan: Plan, steps: Sequence[Step]) -> None:
+        """Measure these steps; an interlock casts doubt on what followed the last drift check."""
+        try:
+            self._measure_steps(plan, steps)
+        except Interlock:
+            block = plan.steps[self._begun_step[0]].block
+            check = self._references.stopped_check(block, self._exposer.scan_s())
+            if check is not None:
+                self._record.add_check(check)
+            raise
 
     def _begin_step(self, index: int, scan_s: float) -> None:
         self._begun_step = (index, scan_s, self._exposer.running_s())

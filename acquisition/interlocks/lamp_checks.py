@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from acquisition.measure.drift import JUMP_U, MIN_JUMP, Drift, is_misplaced, is_usable, rate
 from instrument.record.reading import Check, Reading
@@ -17,6 +18,9 @@ UNPROVEN = "lamp failed at the next reference"
 
 Where the tile shows that the lamp stands at a wrong angle, all readings of that block have it.
 """
+
+
+STOPPED = "interlock"  # flag of a check that has no value: an interlock ended the scan
 
 
 def compared(
@@ -50,6 +54,19 @@ def _is_bad(reading: Reading) -> bool:
     return not is_usable(reading) and not is_misplaced(reading)
 
 
+def stopped_check(last: Reading, time_s: float) -> Check:
+    """Return the check, without a value, that stands for an interlock in mid-scan.
+
+    Whatever it saw may have begun at any time since the last good drift check. `last`: a reading of
+    the block.
+    """
+    unknown = replace(
+        last, kind="drift", signal_dn=math.nan, peak_dn=math.nan, time_s=time_s, free_s=time_s,
+        flags=STOPPED,
+    )  # fmt: skip
+    return Check(before_step=last.step, expected=0.0, u_expected=0.0, jumped=False, reading=unknown)
+
+
 def check_text(check: Check) -> str:
     """Return the outcome of a drift check in words."""
     text = (
@@ -72,9 +89,11 @@ def doubtful_steps(readings: Iterable[Reading], checks: Iterable[Check]) -> froz
     spans: dict[int, list[tuple[float, float]]] = {}
     own, wrong_until_s = list(readings), dict[int, float]()
     for block in {reading.block for reading in own}:
-        made = [(r.time_s, not _is_bad(r), is_usable(r)) for r in own if _is_check_of(r, block)]
+        made = [
+            (r.time_s, not _is_bad(r), is_usable(r), False) for r in own if _is_check_of(r, block)
+        ]
         made += [
-            (c.reading.time_s, not failed(c), is_usable(c.reading))
+            (c.reading.time_s, not failed(c), is_usable(c.reading), c.reading.flags == STOPPED)
             for c in checks
             if c.reading.block == block
         ]
@@ -93,15 +112,16 @@ def _is_check_of(reading: Reading, block: int) -> bool:
     return reading.kind == "drift" and reading.block == block
 
 
-def _doubtful_spans(made: Iterable[tuple[float, bool, bool]]) -> list[tuple[float, float]]:
+def _doubtful_spans(made: Iterable[tuple[float, bool, bool, bool]]) -> list[tuple[float, float]]:
     """Return spans of scan time before failed checks.
 
     `made`: time of each check, in order; whether it confirms what came before it; whether what
-    comes after it may be compared with it.
+    comes after it may be compared with it; whether another interlock ended the scan then, which
+    says nothing about a block without drift checks.
     """
     spans, good_s = [], -math.inf
-    for time_s, confirms, begins in made:
-        if not confirms:
+    for time_s, confirms, begins, stopped in made:
+        if not confirms and not (stopped and good_s == -math.inf):
             spans.append((good_s, time_s))
         if begins:
             good_s = time_s

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from acquisition.interlocks.lamp_checks import check_text, compared, failed
+from acquisition.interlocks.lamp_checks import check_text, compared, failed, stopped_check
 from acquisition.interlocks.reference_level import angle_doubt, level_doubt
 from acquisition.measure.drift import Drift, rate
 from instrument.config.rig import Rig
@@ -68,6 +68,11 @@ class References:
             )
             for tile in both
         ]  # fmt: skip
+
+    def stopped_check(self, block: int, time_s: float) -> Check | None:
+        """Return the check that stands for an interlock; None if the block has had none yet."""
+        own = [r for r in self.readings if r.block == block and r.kind == "drift"]
+        return stopped_check(own[-1], time_s) if own else None
 
     def _contradicting(self, reading: Reading) -> tuple[Reading | None, str]:
         """Return an earlier reading of the tile that contradicts one, and how; None and empty."""

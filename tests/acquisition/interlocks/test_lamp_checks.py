@@ -208,3 +208,31 @@ def test_light_that_changes_between_two_exposures_is_no_fault_of_the_rig_file(
 
     with suppress(Interlock):
         scan(small, record, changed_devices=lambda d: replace(d, camera=Watched(d.camera)))  # type: ignore[arg-type]  # a stand-in
+
+
+@pytest.mark.parametrize("grab", [24, 33, 41])
+def test_after_any_interlock_what_followed_the_last_drift_check_is_measured_again(
+    grab: int, small: Loaded, whole: list[Reading], record: Record
+) -> None:
+    """The world may have been wrong before anything was seen of it."""
+
+    class Watched(PassThrough):
+        calls = 0
+
+        def grab(self, count: int) -> list[Frame]:
+            self.calls += 1
+            if self.calls == grab:
+                raise Interlock("frozen picture")
+            return self._device.grab(count)  # type: ignore[attr-defined,no-any-return]  # a camera
+
+    with pytest.raises(Interlock):
+        scan(small, record, changed_devices=lambda d: replace(d, camera=Watched(d.camera)))  # type: ignore[arg-type]  # a stand-in
+    made = record.readings()
+    last = max(r.step for r in made if r.kind == "drift")
+    since = {r.step for r in made if r.step > last}
+    found = reduced(small, record)
+    assert {p.step for p, f in zip(found.points, found.flags, strict=True) if f} == since
+    scan(small, record)
+    again, good = reduced(small, record), reduce(whole, small.protocol, ())
+    assert not any(again.flags)
+    assert again.brdf == pytest.approx(good.brdf, rel=3e-3)
