@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from instrument.record.event_kinds import INTERLOCK
 from instrument.record.reading import Reading
 
-DOUBTED = "surface not at its place at the next proof"
+DOUBTED = "not at its place in the next picture"
 """Flag of a reading that a later picture puts in doubt."""
 
 _TEXT = re.compile(r"until (\S+) s of the scan, the readings of steps ([\d ]+) are in doubt")
