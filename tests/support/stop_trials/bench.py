@@ -67,10 +67,11 @@ class Devices:
 
     def unplug(self) -> float:
         """Pull the port out; return the time."""
+        unplugged_s = time.monotonic()
         self._link.unlink(missing_ok=True)
         if self._wire is not None:
             self._wire.close()
-        return time.monotonic()
+        return unplugged_s
 
     def replug(self) -> float:
         """Plug the port in again; return the time."""

@@ -56,7 +56,7 @@ class Program:
     """One run of the command; `text`: everything it has said at its terminal or on `errors`.
 
     `waits`: times, and for how long each of its threads had until then been ready to run without a
-    processor, in s.
+    processor, in s. `strike_took_s`: the signal was sent within this time from the one returned.
     """
 
     def __init__(
@@ -66,6 +66,7 @@ class Program:
         self._text, self._errors = b"", errors
         self.code: int | None = None
         self.ended_s = float("inf")
+        self.strike_took_s = 0.0
         self.waits: list[tuple[float, dict[str, float]]] = []
         self.pid = os.fork()
         if self.pid == 0:
@@ -86,6 +87,7 @@ class Program:
             self._drop_terminal()
         elif self.code is None:
             os.kill(self.pid, getattr(signal, name))
+        self.strike_took_s = time.monotonic() - struck_s
         return struck_s
 
     def await_end(self, until_s: float) -> bool:

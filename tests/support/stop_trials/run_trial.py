@@ -37,6 +37,7 @@ class Seen:
 
     struck_s: float = math.nan
     reachable_s: float = math.nan
+    strike_took_s: float = 0.0
     code: int | None = None
     ended_s: float = math.inf
     text: str = ""
@@ -195,7 +196,7 @@ class _Course:
                 seen.struck_s = seen.reachable_s = program.strike("SIGTERM")
         program.await_end(time.monotonic() + ENDS_WITHIN_S)
         seen.code, seen.ended_s, seen.text = program.code, program.ended_s, program.text
-        seen.waits = program.waits
+        seen.waits, seen.strike_took_s = program.waits, program.strike_took_s
         seen.at_end = self._bench.ask("log")
 
     def _refused(self) -> None:

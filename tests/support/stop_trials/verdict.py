@@ -169,7 +169,7 @@ def _standstill(trial: Trial, seen: Seen) -> tuple[float, float, float]:
         begun_s = max(begun_s, min(brakes_s, seen.ended_s))
     late = seen.at_end["late"]
     devices_s = sum(s for at_s, s in late if seen.struck_s <= at_s <= stood_s and s > _DELAY_S)
-    late_s = devices_s + _waited_s(seen.waits, seen.struck_s, stood_s)
+    late_s = devices_s + seen.strike_took_s + _waited_s(seen.waits, seen.struck_s, stood_s)
     return max(stood_s - begun_s, 0.0), stood_s - brakes_s, late_s
 
 
