@@ -36,7 +36,7 @@ from instrument.clock import Clock
 from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
 from instrument.devices import Camera, Lamp, Operator, Surface
-from instrument.errors import DeviceError, Interlock
+from instrument.errors import DeviceError, Interlock, WrongRigFile
 from instrument.pinhole import Pinhole
 from instrument.record.event_kinds import DRIFT, INTERLOCK, OPERATOR
 from instrument.record.reading import Reading
@@ -228,7 +228,7 @@ class Engine:
         """Measure these steps; an interlock casts doubt on what followed the last drift check."""
         try:
             self._measure_steps(plan, steps)
-        except Interlock:
+        except (Interlock, WrongRigFile):
             block = plan.steps[self._begun_step[0]].block
             check = self._references.stopped_check(block, self._exposer.scan_s())
             if check is not None:
