@@ -18,6 +18,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
+from acquisition.terminal import stop_signals
 from acquisition.terminal.streams import lasting_streams
 from instrument.errors import GonioError, InputError, OperatorStop, StorageError
 from instrument.text.terminal_safe import escape_control_characters
@@ -305,7 +306,9 @@ def bench(
 
 
 def main() -> None:
-    """Run the command line; `acquisition.entry` has installed its signals."""
+    """Run the command line, for which `acquisition.entry` has begun with its signals."""
+    if not stop_signals.begun():  # a script `gonio` of an older installation calls this directly
+        stop_signals.begin()
     # Hardly any object is part of a cycle: rarer collections save a tenth of a short run.
     gc.set_threshold(100_000, 20, 20)
     try:
