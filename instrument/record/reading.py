@@ -16,12 +16,13 @@ class Reading:
 
     `step` is its number in the plan. Angles in degrees, theta_r signed. `signal_dn` is the
     area-weighted mean over the window and all frames, dark subtracted, divided by cos^4. The u are
-    its standard uncertainties: `u_noise_dn` from photon and read-out noise and from the scatter
-    of the frames beyond it (flicker, black level), `u_quantisation_dn` from rounding the frames to whole counts, `u_dark_dn` from the dark (shared by all readings of
-    one exposure), `u_placement_dn` from the height of the surface above the axis (signed: one
-    placement shifts all its readings together; without the part that depends on the reflectance),
-    and `u_texture_dn` from the texture at the window's edge, to second order of the placement, and
-    from hot pixels, which are left out, and saturated ones. `window_pixels`: the area that counts.
+    its standard uncertainties: `u_noise_dn` from photon and read-out noise and from what frames
+    scatter beyond it (flicker, black level), `u_quantisation_dn` from rounding the frames to whole
+    counts, `u_dark_dn` from the dark (shared by all readings of one exposure), `u_placement_dn`
+    from the height of the surface above the axis (signed: one placement shifts all its readings
+    together; without the part that depends on the reflectance), and `u_texture_dn` from the texture
+    at the window's edge, to second order of the placement, and from hot pixels, which are left out,
+    and saturated ones. `window_pixels`: the area that counts.
     `lamp_setting` counts the positions of the lamp, `block` the times that it was set by hand.
     `time_s` is the scan time at the middle of the frames, without interruptions of the scan;
     `free_s` is the time at which the rig could move on, the dark having been taken.
