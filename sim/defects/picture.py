@@ -20,13 +20,17 @@ _DARK = 0.02  # of the light, in the shadow of a hand
 FloatImage = NDArray[np.float32]
 
 
-def scattered(light: FloatImage, world: World) -> FloatImage:
-    """Return the picture of the lamp's light behind a hand and through a faulty lens."""
+def scattered(light: FloatImage, world: World, px_per_mm: float) -> FloatImage:
+    """Return the picture of the lamp's light behind a hand and through a faulty lens.
+
+    `px_per_mm`: scale of the picture at the axis.
+    """
     if world.shadow:
         light = light.copy()
         light[:, : round(world.shadow * light.shape[1])] *= _DARK
-    if world.blur_px:
-        light = np.asarray(cv2.GaussianBlur(light, (0, 0), world.blur_px), dtype=np.float32)
+    if world.blur_mm:
+        sigma_px = world.blur_mm * px_per_mm
+        light = np.asarray(cv2.GaussianBlur(light, (0, 0), sigma_px), dtype=np.float32)
     if world.glare:
         light = light + np.float32(world.glare) * light.mean()
     return light

@@ -24,21 +24,21 @@ class World:
     frame to frame. `shutter_open`, `shutter_shut`: share that passes the shutter, or the lid, when
     it should be open or shut. `room`, `spot`: light from elsewhere on all of the picture or on a
     spot, and `glare`: light scattered in the lens; in units of the lamp's on white and of the
-    picture's mean. `shadow`: share of the picture's columns in the shadow of a hand. `blur_px`:
-    standard deviation of an image out of focus.
+    picture's mean. `shadow`: share of the picture's columns in the shadow of a hand. `blur_mm`:
+    standard deviation of an image out of focus, at the axis.
 
     Mechanics: `theta_i_deg`, `dphi_deg`, `theta_r_deg`: true angle minus the one the axis shows.
     `shift_mm` (along x), `turn_deg` (in its plane), `tilt_deg` (towards the camera's positive
     side): place of the surface. `mounted`: what lies on the table.
 
     Camera: `exposure`: factor of the true exposure. `control`: factor of the exposure that another
-    program has set, and that the camera reports. `gain`: factor of the counts. `black_dn`: shift
-    of the black level. `gamma`: exponent of the counts. `noise`: factor of the noise. `hot_px`:
-    side in pixels of a cluster of hot pixels, `dead_columns`: columns without counts, both in the
-    window. `stuck_bit`: number of a bit of each count that is always 1. `black_rows`: share of the
-    rows that is lost in the third frame of each series. `repeats`: 1 if that frame is the one
-    before it again. `stale`: 1 if the first frame is from before the series. `frozen`: 1 if all
-    frames are the last one.
+    program has set, and that the camera reports. `gain`: factor of the counts that the camera
+    reports, `amplifier`: one that it does not. `black_dn`: shift of the black level. `gamma`:
+    exponent of the counts. `noise`: factor of the noise. `hot_px`: side in pixels of a cluster of
+    hot pixels, `dead_columns`: columns without counts, both in the window. `stuck_bit`: number of
+    a bit of each count that is always 1. `black_rows`: share of the rows that is lost in the third
+    frame of each series. `repeats`: 1 if that frame is the one before it again. `stale`: 1 if the
+    first frame is from before the series. `frozen`: 1 if all frames are the last one.
     """
 
     lamp: float = 1.0
@@ -50,7 +50,7 @@ class World:
     spot: float = 0.0
     glare: float = 0.0
     shadow: float = 0.0
-    blur_px: float = 0.0
+    blur_mm: float = 0.0
     theta_i_deg: float = 0.0
     dphi_deg: float = 0.0
     theta_r_deg: float = 0.0
@@ -61,6 +61,7 @@ class World:
     exposure: float = 1.0
     control: float = 1.0
     gain: float = 1.0
+    amplifier: float = 1.0
     black_dn: float = 0.0
     gamma: float = 1.0
     noise: float = 1.0

@@ -49,7 +49,7 @@ def electrons_per_s(scene: Scene) -> FloatImage:
         covered = projection.outline.fraction.astype(np.float32)
         image[crop] += covered * (_surface_radiance(scene, projection) - image[crop])
     image *= _response(Pinhole.of(rig), rig.lamp.white_electrons_per_s)
-    return scattered(image, scene.world)
+    return scattered(image, scene.world, rig.camera.width_px / rig.camera.field_width_mm)
 
 
 def _project(scene: Scene) -> _Projection:

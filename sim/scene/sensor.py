@@ -96,7 +96,8 @@ class Sensor:
             electrons += (self._hot * exposure_s).astype(np.float32)
         np.minimum(electrons, np.float32(s.full_well_electrons), out=electrons)
         spread = np.sqrt(electrons + np.float32(s.read_noise_electrons**2))
-        gain = np.float32(self.scene.world.gain / s.electrons_per_dn)
+        world = self.scene.world
+        gain = np.float32(world.gain * world.amplifier / s.electrons_per_dn)
         spread *= gain
         electrons *= gain
         electrons += np.float32(s.black_level_dn)

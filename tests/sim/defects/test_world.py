@@ -15,9 +15,10 @@ from tests.support.scans import simulated_scene, small_scan
 
 SIZES = {
     "lamp": "0.9", "lens": "0.9", "flicker": "0.1", "shutter_open": "0.9", "shutter_shut": "0.1",
-    "room": "0.1", "spot": "1", "glare": "0.1", "shadow": "0.5", "blur_px": "3", "theta_i_deg": "5",
+    "room": "0.1", "spot": "1", "glare": "0.1", "shadow": "0.5", "blur_mm": "1", "theta_i_deg": "5",
     "dphi_deg": "20", "theta_r_deg": "5", "shift_mm": "3", "turn_deg": "5", "tilt_deg": "3",
-    "mounted": "white tile", "exposure": "1.1", "control": "1.1", "gain": "1.1", "black_dn": "5",
+    "mounted": "white tile", "exposure": "1.1", "control": "1.1", "gain": "1.1", "amplifier": "1.1",
+    "black_dn": "5",
     "gamma": "0.9", "noise": "0.5", "hot_px": "4", "dead_columns": "2", "stuck_bit": "3",
     "black_rows": "0.1", "repeats": "1", "stale": "1", "frozen": "1",
 }  # fmt: skip

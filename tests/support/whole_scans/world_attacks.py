@@ -37,9 +37,27 @@ class Sound:
     """Scan of a sound world: its calls of devices, its values by step, and what it flagged."""
 
     calls: tuple[str, ...]
-    tiles: int  # readings of the tile before the first one of the sample
+    kinds: tuple[str, ...]  # of the readings, in the order of time
+    blocks: tuple[int, ...]
     values: dict[int, float]
     flagged: dict[int, str]
+
+    @property
+    def tiles(self) -> int:
+        """Number of readings of the tile before the first one of the sample."""
+        return next(n for n, kind in enumerate(self.kinds) if kind != "tile")
+
+    def proven(self) -> list[int]:
+        """Numbers of the calls of grab between two drift checks of one block."""
+        found = list[int]()
+        for block in set(self.blocks):
+            checks = [
+                n
+                for n, (kind, own) in enumerate(zip(self.kinds, self.blocks, strict=True), 1)
+                if kind == "drift" and own == block
+            ]
+            found += range(self.grab_after(checks[0]), self.grab_after(checks[-1] - 1) + 1)
+        return found
 
     def grabs(self) -> int:
         """Number of calls of the camera's grab."""
@@ -92,8 +110,8 @@ class Outcome:
 
 
 def stays(attack: Attack, size: str, sound: Sound, random: np.random.Generator) -> list[Change]:
-    """From any picture on."""
-    return [(attack.fault, size, "at", "camera.grab", int(random.integers(2, sound.grabs() + 1)))]
+    """From any picture between two drift checks on."""
+    return [(attack.fault, size, "at", "camera.grab", int(random.choice(sound.proven())))]
 
 
 def always(attack: Attack, size: str, sound: Sound, random: np.random.Generator) -> list[Change]:
@@ -116,15 +134,15 @@ def on_tile(attack: Attack, size: str, sound: Sound, random: np.random.Generator
 
 def passes(attack: Attack, size: str, sound: Sound, random: np.random.Generator) -> list[Change]:
     """During one to ten series of pictures."""
-    first = int(random.integers(2, sound.grabs() + 1))
+    first = int(random.choice(sound.proven()))
     last = first + int(random.integers(1, 11))
     return [(attack.fault, size, "at", "camera.grab", first), back(attack, last)]
 
 
 def grows(attack: Attack, size: str, sound: Sound, random: np.random.Generator) -> list[Change]:
-    """From any picture on, to the full size at the end of the scan."""
+    """From any picture between two drift checks on, to the full size at the end of the scan."""
     start, end = float(getattr(SOUND, attack.fault)), float(size)
-    first = int(random.integers(2, sound.grabs() + 1))
+    first = int(random.choice(sound.proven()))
     steps = np.unique(np.linspace(first, sound.grabs(), 20).astype(int))
     levels = np.linspace(start, end, steps.size + 1)[1:]
     return [
@@ -159,10 +177,11 @@ def sound_scan(loaded: Loaded, folder: Path) -> Sound:
     if result.error is not None:
         raise result.error
     reduced = reduced_scan(loaded, folder)
-    kinds = [r.kind for r in sorted(result.readings, key=lambda r: r.time_s)]
+    readings = sorted(result.readings, key=lambda r: r.time_s)
     return Sound(
         tuple(faults.triggers.calls),
-        next(n for n, kind in enumerate(kinds) if kind != "tile"),
+        tuple(r.kind for r in readings),
+        tuple(r.block for r in readings),
         {p.step: float(v) for p, v in zip(reduced.points, reduced.brdf, strict=True)},
         {p.step: f for p, f in zip(reduced.points, reduced.flags, strict=True) if f},
     )
@@ -181,7 +200,7 @@ def attacked(
     result = scanned(loaded, folder, planned(changes))
     outcome = Outcome(stop=_cause(result.error))
     outcome.flags, outcome.off = _compared(loaded, folder, sound)
-    if result.error is not None:
+    if result.error is not None and "Go on with: gonio resume" in str(result.error):
         resumed = scanned(loaded, folder)
         outcome.again = _cause(resumed.error)
         if resumed.error is None:

@@ -7,14 +7,35 @@ resumed in a sound world. The other way round, sound scans raise no interlock an
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.support.whole_scans.random_scans import RIGS, random_scan, warming_lamp
-from tests.support.whole_scans.world_attacks import reduced_scan, scanned
+from tests.support.whole_scans.world_attacks import (
+    Attack,
+    Outcome,
+    always,
+    attacked,
+    reduced_scan,
+    scanned,
+    sound_scan,
+)
+from tests.support.whole_scans.world_faults import ATTACKS, LIGHT, OUTLINE, UNSEEN
 
 OLD_FLAGS = {"window leaves frame", "too few pixels", "saturated", "hot pixels"}
+SHARE = (  # of the attacks, in the normal run, each on one of the rigs
+    "lamp dies in mid-scan", "darks leak", "one frame partly black", "gain changed",
+    "the same picture for ever", "lamp flickers always",
+)  # fmt: skip
+AT_RESUME = (
+    Attack("lamp dead at the resume", "lamp", ("0", "0.5"), always, LIGHT),
+    Attack(
+        "tile on the table at the resume", "mounted", ("white tile", "nothing"), always, OUTLINE
+    ),
+)
 WARM_UP = 0.01  # of the lamp's output, within a third of a scan
 
 
@@ -37,3 +58,44 @@ def test_sound_scans_raise_no_interlock(slow: bool, tmp_path: Path) -> None:
         for rig in RIGS:
             found += _false_alarms(rig, seed, tmp_path / f"{rig} {seed}", 1 if slow else 4)
     assert found == []
+
+
+def _outcomes(
+    rig: str, seed: int, attacks: list[Attack], folder: Path, slow: bool
+) -> dict[tuple[str, str], Outcome]:
+    """What became of attacks at both sizes, or only the larger one, by name and size."""
+    loaded = random_scan(rig, seed, shrink=1 if slow else 4, least_frames=3)
+    sound, found = sound_scan(loaded, folder / "sound"), dict[tuple[str, str], Outcome]()
+    for attack in attacks:
+        for number, size in enumerate(attack.sizes if slow else attack.sizes[:1]):
+            random = np.random.default_rng([seed, *attack.name.encode(), number])
+            changes = attack.course(attack, size, sound, random)
+            stop = int(random.choice(sound.proven())) if attack in AT_RESUME else 0
+            run = folder / f"{attack.name} {size}"
+            found[attack.name, size] = attacked(loaded, run, sound, changes, stop)
+    return found
+
+
+@pytest.mark.slow
+def test_no_point_is_wrong_without_a_flag(
+    slow: bool, tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
+    """All attacks on each rig with --slow, else a few; `--junitxml` shows each outcome.
+
+    Those in `UNSEEN` may be silent, and no others.
+    """
+    silent = []
+    for number, rig in enumerate(RIGS):
+        share = [a for a in ATTACKS if a.name in SHARE[number::3]] + list(AT_RESUME[number:1])
+        attacks = [*ATTACKS, *AT_RESUME] if slow else share
+        for seed in range(3) if slow else (7,):
+            folder = tmp_path / f"{rig} {seed}"
+            for (name, size), outcome in _outcomes(rig, seed, attacks, folder, slow).items():
+                record_property(f"{rig} {seed}: {name} {size}", outcome.word)
+                if outcome.silent and name not in UNSEEN:
+                    silent.append((rig, seed, name, size, outcome.word))
+    assert silent == []
+
+
+def test_the_unseen_attacks_are_among_all() -> None:
+    assert set(UNSEEN) <= {attack.name for attack in ATTACKS}
