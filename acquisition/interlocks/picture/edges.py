@@ -27,9 +27,10 @@ _LEAST_LENGTH = 28  # pixels of an edge: shorter ones have no certain direction
 _CORNER = 4  # pixels left out at both ends of an edge, where another one is near
 _NOISE_RATIO = 8.0  # of a step to the median fluctuation: none of 4 x 96 x 600 samples of noise
 _LEAST_CONTRAST = 0.05  # of the brightest part: weaker steps may be shadows or stray light
+_LEAST_DN = 3.0  # counts: smaller steps may be rounding, whose noise is not seen in equal counts
 _LIKE_LARGEST = 0.5  # of the profile's largest step: smaller ones are texture
 _LEAST_SHARE = 0.6  # of the stations that must agree on a line
-_MAX_SCATTER_MM = 1.0  # of the stations about the line: a frayed edge has no place
+_MAX_SCATTER_MM = 0.5  # of the stations about the line: a frayed edge has no place
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +149,7 @@ class _Profiles:
         noise = self._fluctuation(size[::3])
         bright = float(np.percentile(self.brightness[::3], 95))
         least = np.maximum(
-            max(_NOISE_RATIO * noise, _LEAST_CONTRAST * bright),
+            max(_NOISE_RATIO * noise, _LEAST_CONTRAST * bright, _LEAST_DN),
             _LIKE_LARGEST * size.max(axis=1, keepdims=True),
         )
         peak = size >= cv2.dilate(size, np.ones((1, 2 * (_FLANK + _GAP) + 1), np.uint8))

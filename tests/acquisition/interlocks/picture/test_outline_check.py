@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.interlocks.picture.outline import CHI2_LIMITS, LIMIT_SIGMA, Deviation
 from acquisition.interlocks.picture.outline_check import OutlineCheck
 from acquisition.plan.plan import Step
 from acquisition.plan.pose import Pose
@@ -116,7 +115,7 @@ def test_so_it_is_at_oblique_angles_on_the_other_rigs(rig: str, said_deg: float)
     assert "The picture is that of theta_r" in _told(rig, said_deg, said_deg + 5.0)
 
 
-@pytest.mark.parametrize("said_deg", [-55.0, -35.0, -20.0, 20.0, 40.0])
+@pytest.mark.parametrize("said_deg", [-35.0, 25.0])
 @pytest.mark.parametrize("rig", RIGS)
 def test_a_smaller_slip_is_seen_in_a_later_picture(rig: str, said_deg: float) -> None:
     """Once earlier pictures have told size and place of the surface: 2 degrees, nearly anywhere."""
@@ -128,7 +127,7 @@ def test_a_smaller_slip_is_seen_in_a_later_picture(rig: str, said_deg: float) ->
 
 
 @pytest.mark.parametrize("rig", RIGS)
-@pytest.mark.parametrize("angle_deg", [-75.0, -30.0, 0.0, 10.0, 60.0])
+@pytest.mark.parametrize("angle_deg", [-75.0, 0.0, 60.0])
 def test_no_slip_no_word(rig: str, angle_deg: float) -> None:
     assert _told(rig, angle_deg, angle_deg) == ""
 
@@ -186,13 +185,6 @@ def test_a_round_sample_is_told_how_to_go_on_and_can_be_left_out() -> None:
     assert text == "" or "outline: none" in text
 
 
-def test_the_limits_are_as_rare_as_six_standard_deviations() -> None:
-    from scipy.stats import chi2, norm
-
-    for values, limit in CHI2_LIMITS.items():
-        assert limit == pytest.approx(chi2.isf(2 * norm.sf(LIMIT_SIGMA), values), abs=0.005)
-
-
 def test_a_slip_in_mid_scan_ends_it_and_names_the_step(
     record: Record, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -217,11 +209,6 @@ def test_one_picture_with_a_hand_in_it_is_noted_and_the_next_counts(
     scan(small_scan(), record)
     told = [r.getMessage() for r in caplog.records if r.name == "acquisition.interlocks"]
     assert told == ["a hand. A second frame shows it at its place, and counts"]
-
-
-def test_a_deviation_keeps_the_order_of_its_fields() -> None:
-    values = np.arange(13.0)
-    assert Deviation.of(values).values.tolist() == values.tolist()
 
 
 @pytest.mark.parametrize(("slip_deg", "doubted"), [(5.0, [3, 4, 5]), (1.5, [0, 1, 2, 3, 4, 5, 6])])
