@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from functools import cache
 
 import numpy as np
 import pytest
@@ -25,6 +26,11 @@ from tests.support.whole_scans.stopped_scan import scan
 RIGS = ["bench_12bit", "paper_1995"]
 
 
+@cache
+def rig_of(name: str) -> Rig:
+    return small_scan(name).rig
+
+
 def dark(rig: Rig, exposure_s: float, electrons_per_s: float, offset_dn: float, seed: int) -> Dark:
     """Dark of a rig whose pixels collect so many electrons, and whose black level is off."""
     camera, random = rig.camera, np.random.default_rng([seed, round(exposure_s * 1e9)])
@@ -42,11 +48,11 @@ def window(rig: Rig) -> Window:
 
 
 @pytest.mark.parametrize("rig_name", RIGS)
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(5))
 def test_a_warm_camera_with_another_black_level_is_accepted_and_light_is_not(
     rig_name: str, seed: int
 ) -> None:
-    rig, random = small_scan(rig_name).rig, np.random.default_rng(seed)
+    rig, random = rig_of(rig_name), np.random.default_rng(seed)
     camera, white = rig.camera, rig.lamp.white_electrons_per_s
     warm = camera.dark_current_electrons_per_s * 2.0 ** random.uniform(-3, 2)
     offset = random.uniform(-0.05, 0.05) * (camera.max_dn - camera.black_level_dn)

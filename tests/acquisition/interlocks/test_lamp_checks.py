@@ -47,7 +47,7 @@ def outcomes(times_s: np.ndarray, levels: np.ndarray, seed: int = 0) -> list[boo
     return found
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(15))
 def test_a_lamp_that_warms_up_or_drifts_does_not_end_a_scan(seed: int) -> None:
     random = np.random.default_rng(seed)
     apart_s = random.uniform(20.0, 400.0)
@@ -60,7 +60,7 @@ def test_a_lamp_that_warms_up_or_drifts_does_not_end_a_scan(seed: int) -> None:
     assert not any(outcomes(times_s, drifting, seed))
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(15))
 def test_a_jump_at_any_check_ends_a_scan(seed: int) -> None:
     random = np.random.default_rng(seed)
     times_s = random.uniform(20.0, 400.0) * np.arange(8)
@@ -91,8 +91,7 @@ def drift_steps(loaded: Loaded) -> list[int]:
     return [step.index for step in make_plan(loaded).steps if step.kind == "drift"]
 
 
-@pytest.mark.parametrize("level", [0.0, 0.02, 0.95, 1.02])
-@pytest.mark.parametrize("which", [1, -1])
+@pytest.mark.parametrize(("level", "which"), [(0.0, 1), (0.02, -1), (0.95, -1), (1.02, 1)])
 def test_a_lamp_that_changes_in_mid_scan_stops_it_and_a_resume_makes_up_for_it(
     level: float,
     which: int,
@@ -191,7 +190,7 @@ def test_a_strong_linear_drift_is_followed(small: Loaded, record: Record) -> Non
     assert not any(reduced(loaded, record).flags)
 
 
-@pytest.mark.parametrize("grab", [5, 6, 7, 8])
+@pytest.mark.parametrize("grab", [6, 7])
 def test_light_that_changes_between_two_exposures_is_no_fault_of_the_rig_file(
     grab: int, small: Loaded, record: Record, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -210,7 +209,7 @@ def test_light_that_changes_between_two_exposures_is_no_fault_of_the_rig_file(
         scan(small, record, changed_devices=lambda d: replace(d, camera=Watched(d.camera)))  # type: ignore[arg-type]  # a stand-in
 
 
-@pytest.mark.parametrize(("grab", "error"), [(24, Interlock), (33, WrongRigFile), (41, Interlock)])
+@pytest.mark.parametrize(("grab", "error"), [(33, WrongRigFile), (41, Interlock)])
 def test_after_any_interlock_what_followed_the_last_drift_check_is_measured_again(
     grab: int, error: type[DeviceError], small: Loaded, whole: list[Reading], record: Record
 ) -> None:

@@ -26,7 +26,7 @@ def unchecked(small: Loaded) -> Loaded:
 
 
 @pytest.mark.parametrize("level", [0.0, 1e-6])
-@pytest.mark.parametrize("at_step", [2, 5, 9])
+@pytest.mark.parametrize("at_step", [2, 9])
 def test_a_lamp_that_goes_out_without_drift_checks_flags_every_point_since(
     at_step: int, level: float, unchecked: Loaded, record: Record, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -47,7 +47,7 @@ def test_a_lamp_that_comes_back_leaves_no_proof_against_the_points_in_the_dark(
     assert not any(found.flags)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(10))
 def test_a_dark_point_is_flagged_unless_light_is_proven_later(
     seed: int, whole: list[Reading]
 ) -> None:
