@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -51,6 +52,15 @@ def run_protocol(
     the scan ends early.
     """
     loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
+    scan_into(loaded, out, lambda record: _finish(record, loaded, as_json))
+
+
+def scan_into(loaded: Loaded, out: Path | None, finish: Callable[[Record], object]) -> Path:
+    """Plan and scan into a new folder, then call `finish` with the complete record.
+
+    Returns the folder: `out`, or one named after the protocol and the time. Raises as
+    `run_protocol` does, and what `finish` raises.
+    """
     plan = make_plan(loaded)
     check_ready(loaded)
     folder = out if out is not None else default_folder(loaded)
@@ -62,7 +72,8 @@ def run_protocol(
     ):
         write_run_inputs(record)
         scan(loaded, plan, record)
-        _finish(record, loaded, as_json)
+        finish(record)
+    return folder
 
 
 def resume_run(folder: Path, yes: bool, as_json: bool) -> None:

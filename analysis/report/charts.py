@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.report.style import BAND, GREY, INK, Dashes, style_of, svg_of
+from analysis.report.style import BAND, GREY, INK, Dashes, Drawing, style_of, svg_of
 from analysis.report.sweeps import PlottedSweep
 from analysis.report.swept_axis import AZIMUTH, VIEW
 from analysis.report.value_axis import set_symmetric_axis, set_value_axis
@@ -52,6 +52,11 @@ def shape_charts(sweeps: Sequence[PlottedSweep], quantity: str) -> list[str]:
 
 def brdf_chart(sweeps: Sequence[PlottedSweep], quantity: str) -> str:
     """Measured quantity of each sweep in a chart of its own, with lines of the models."""
+    return svg_of(*brdf_drawing(sweeps, quantity), "brdf")
+
+
+def brdf_drawing(sweeps: Sequence[PlottedSweep], quantity: str) -> Drawing:
+    """The same chart, not drawn yet."""
     shown = thinned(sweeps)
     columns = min(len(shown), 4 if len(shown) in (4, 7, 8) or len(shown) > 9 else 3)
     rows = -(-len(shown) // columns)
@@ -76,7 +81,7 @@ def brdf_chart(sweeps: Sequence[PlottedSweep], quantity: str) -> str:
         for ax in axes[:, 0]:
             ax.set_ylabel(quantity)
 
-    return svg_of(0.9 + 2.2 * rows, draw, "brdf")
+    return Drawing(0.9 + 2.2 * rows, draw)
 
 
 def thinned(sweeps: Sequence[PlottedSweep]) -> list[PlottedSweep]:

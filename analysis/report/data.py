@@ -112,6 +112,11 @@ class ReportData:
         return bool(np.any(np.isfinite(self.brdf)))
 
     @property
+    def quantity(self) -> str:
+        """Name and unit of the measured quantity."""
+        return "BRDF (1/sr)" if self.has_brdf else "radiance (counts/s)"
+
+    @property
     def value_and_u(self) -> tuple[FloatArray, FloatArray]:
         """BRDF (N,) and its u in 1/sr; without a white tile radiance and its u in counts/s."""
         if self.has_brdf:

@@ -114,7 +114,7 @@ def _charts(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
     if not sweeps:
         return '<h2 id="shape">Measured values</h2>\n<p>No geometry has a value to plot.</p>'
     name = "BRDF" if data.has_brdf else "Radiance"
-    quantity = "BRDF (1/sr)" if data.has_brdf else "radiance (counts/s)"
+    quantity = data.quantity
     figures = [
         '<h2 id="shape">Shape of the reflection</h2>',
         _figure(

@@ -11,11 +11,12 @@ import math
 import re
 from collections.abc import Callable, Iterable
 from decimal import Decimal
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+F = TypeVar("F", bound="Figure")
 Dashes = str | tuple[float, tuple[float, ...]]
 
 # Palette of Okabe and Ito, distinguishable by colour-blind readers, without yellow.
@@ -76,6 +77,23 @@ def style_of(incidence: int) -> tuple[str, str, Dashes]:
         _MARKERS[incidence % len(_MARKERS)],
         _DASHES[incidence % len(_DASHES)],
     )
+
+
+class Drawing(NamedTuple):
+    """Chart that is not drawn yet: its height in inches, and what draws it into a figure."""
+
+    height_in: float
+    draw: Callable[[Figure], None]
+
+
+def drawn_in(kind: type[F], drawing: Drawing) -> F:
+    """Draw into a new figure of the given class of Matplotlib's figures."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(_SETTINGS):
+        figure = kind(figsize=(_WIDTH_IN, drawing.height_in))
+        drawing.draw(figure)
+    return figure
 
 
 def svg_of(height_in: float, draw: Callable[[Figure], None], name: str) -> str:
