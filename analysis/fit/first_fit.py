@@ -20,7 +20,7 @@ from analysis.fit.search.levenberg_marquardt import HUBER, Minimum
 from analysis.fit.search.minima import LOWER, all_minima
 from analysis.fit.search.problem import Problem
 from analysis.fit.search.starting_values import MANY, Grid, Known
-from analysis.models import MODELS, Model
+from analysis.models import Model
 from analysis.models.special_cases import special_cases
 from instrument.errors import NotDetermined
 from instrument.geometry import FloatArray, Geometry
@@ -78,7 +78,7 @@ class FirstFits:
         enough = enough_chi2(m, problem)
         found = all_minima(problem, nodes, enough)
         clear = found[0].chi2 <= enough and m.size >= MANY
-        for x in () if clear else self._special_cases(problem):
+        for x in () if clear else self._special_cases(model, problem):
             if problem.chi2(x) < found[0].chi2 * (1 - LOWER):
                 found.insert(0, problem.solve(x))
         starts = tuple(minimum.x for minimum in found)
@@ -93,18 +93,18 @@ class FirstFits:
             self.grids[model.name] = Grid.of(problem, self.known)
         return self.grids[model.name]
 
-    def _special_cases(self, problem: Problem) -> Iterator[FloatArray]:
-        """Fits of the special cases of the problem's model, as parameters (K,) of the problem."""
-        model = problem.model
-        for case in special_cases(model.name):
-            first = self.of(MODELS[case.name])
+    def _special_cases(self, model: Model, problem: Problem) -> Iterator[FloatArray]:
+        """Fits of the special cases of a model, as parameters (K,) of the problem."""
+        for case in special_cases(model):
+            first = self.of(case.model)
             names = (p.name for p in first.problem.model.parameters)
             values = dict(zip(names, map(float, first.solution.x), strict=True))
-            at = case.embed(values, model)
+            own = problem.model.parameters
+            at = case.embed(values, problem.model)
             if FACTOR_NAME in values:  # relative: no scale is 0, but all may be small
-                small = {p.name: max(at[p.name], p.low) for p in model.parameters if p.scale}
+                small = {p.name: max(at[p.name], p.low) for p in own if p.scale}
                 at |= small | {FACTOR_NAME: values[FACTOR_NAME]}
-            x = np.array([at[p.name] for p in model.parameters])
+            x = np.array([at[p.name] for p in own])
             if np.all((problem.low <= x) & (x <= problem.high)):
                 yield x
 

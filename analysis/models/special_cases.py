@@ -15,7 +15,7 @@ from functools import cache
 import numpy as np
 
 from analysis.models import MODELS, Model
-from analysis.models.base import named_terms
+from analysis.models.base import add, named_terms
 from instrument.geometry import Geometry
 
 At = Mapping[str, float | str]
@@ -42,10 +42,15 @@ _ANY = Geometry.from_degrees(theta_i=[20.0, 50.0], theta_r=[35.0, 60.0], dphi=[3
 
 @dataclass(frozen=True, slots=True)
 class SpecialCase:
-    """A model that another contains: its name, and values `at` which the other becomes it."""
+    """A model that another contains, and values `at` which the other becomes it."""
 
-    name: str
+    model: Model
     at: At
+
+    @property
+    def name(self) -> str:
+        """Name of the contained model."""
+        return self.model.name
 
     def embed(self, values: Mapping[str, float], larger: Model) -> dict[str, float]:
         """Parameters of the larger model at which it has the BRDF of the special case at `values`.
@@ -58,28 +63,32 @@ class SpecialCase:
 
 
 @cache
-def special_cases(name: str) -> tuple[SpecialCase, ...]:
-    """Special cases of the model or sum of that name, for single terms and for several at once."""
-    model = MODELS[name]
+def special_cases(model: Model) -> tuple[SpecialCase, ...]:
+    """Special cases of a model or sum, for single terms and for several at once.
+
+    A model that is not listed in `MODELS` has those of the terms of its sum.
+    """
     found: dict[tuple[object, ...], SpecialCase] = {}
     for cases in itertools.product(*map(_cases, named_terms(model))):
-        names = [case for case, _ in cases if case]
+        terms = [term for term, _ in cases if term is not None]
+        names = [term.name for term in terms]
         at = _merged([at for _, at in cases])
-        if at is None or not names or len(set(names)) < len(names) or "+".join(names) == name:
+        if at is None or not names or len(set(names)) < len(names) or "+".join(names) == model.name:
             continue
-        case = SpecialCase("+".join(names), at)
+        case = SpecialCase(terms[0] if len(terms) == 1 else add(*terms), at)
         found[(case.name, *sorted(map(str, at.items())))] = case
     return tuple(found.values())
 
 
-def _cases(term: Model) -> Iterator[tuple[str, At]]:
-    """A term of a sum as it is, as one of its special cases, and (with no name) left out."""
-    yield term.name, {p.name: p.name for p in term.parameters}
-    yield from SPECIAL_CASES.get(term.name, {}).items()
+def _cases(term: Model) -> Iterator[tuple[Model | None, At]]:
+    """A term of a sum as it is, as one of its special cases, and (None) left out."""
+    yield term, {p.name: p.name for p in term.parameters}
+    for name, at in SPECIAL_CASES.get(term.name, {}).items():
+        yield MODELS[name], at
     zeros = {p.name: 0.0 for p in term.parameters if p.scale or p.level}
     others = {p.name: p.default for p in term.parameters if p.name not in zeros}
     if zeros and not np.any(term.kernel(_ANY, **zeros, **others)):
-        yield "", zeros
+        yield None, zeros
 
 
 def _merged(parts: list[At]) -> At | None:

@@ -135,7 +135,7 @@ def test_no_fit_is_above_the_truth_nor_above_a_special_case(slow: bool) -> None:
         least, solved = found.solved.chi2(found.x), found.solved
         if least > solved.chi2(case.truth) * AS_LOW:
             missed.append(f"{case}: {least / solved.chi2(case.truth):g} of the truth's chi2")
-        for special in special_cases(case.model.name):
+        for special in special_cases(case.model):
             values = fit(MODELS[special.name], case.measurements).values
             at = special.embed(values, case.model)
             x = np.array([at[p.name] for p in case.model.parameters])

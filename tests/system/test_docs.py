@@ -1,0 +1,51 @@
+"""The code in the documents runs in the order in which it stands, and their links lead somewhere."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.paths import ROOT
+
+DOCUMENTS = sorted((ROOT / "docs").glob("*.md"))
+NAMES = [path.name for path in DOCUMENTS]
+_LINK = re.compile(r"\]\((?!https?:)([^)#]+)")
+_ROOMS = ("instrument", "drivers", "analysis", "sim", "acquisition", "configs", "tests", "docs")
+_PATH = re.compile(rf"`((?:{'|'.join(_ROOMS)})/[\w./]+\.(?:py|yaml|md|csv|svg))`")
+
+
+def _code(path: Path) -> str:
+    return "\n".join(re.findall(r"```python\n(.*?)```", path.read_text(), flags=re.DOTALL))
+
+
+@pytest.mark.parametrize("path", [p for p in DOCUMENTS if _code(p)], ids=lambda p: p.name)
+def test_the_code_of_a_document_runs(path: Path, tmp_path: Path) -> None:
+    script = tmp_path / "code.py"
+    script.write_text(_code(path))
+    command = [sys.executable, "-W", "error", str(script)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "README.md"], ids=lambda p: p.name)
+def test_a_link_leads_to_a_file(path: Path) -> None:
+    missing = [to for to in _LINK.findall(path.read_text()) if not (path.parent / to).exists()]
+    assert not missing
+
+
+@pytest.mark.parametrize("path", [*DOCUMENTS, ROOT / "README.md"], ids=lambda p: p.name)
+def test_a_file_that_a_document_names_exists(path: Path) -> None:
+    named = set(_PATH.findall(path.read_text())) - {
+        "analysis/models/specular/cosine_lobe.py",  # those of the worked examples
+    }
+    assert not sorted(name for name in named if not (ROOT / name).exists())
+
+
+def test_the_documents_are_the_ones_that_the_readme_lists() -> None:
+    readme = (ROOT / "README.md").read_text()
+    assert NAMES
+    assert not [name for name in NAMES if f"docs/{name}" not in readme]
