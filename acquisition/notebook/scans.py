@@ -20,7 +20,7 @@ from instrument.geometry import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PlannedScan:
-    """Scan that a protocol plans, of N points; `scan` and `loaded` hold every step and both files."""
+    """Scan that a protocol plans, of N points; `scan` holds its steps, `loaded` both files."""
 
     scan: Plan
     loaded: Loaded
