@@ -1,4 +1,4 @@
-"""Every command and example in the README works."""
+"""Every command and example in the README and in the document on rigs works."""
 
 from __future__ import annotations
 
@@ -15,15 +15,19 @@ from tests.support.paths import CONFIGS, ROOT
 README = (ROOT / "README.md").read_text()
 
 
-def _blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+RIGS = (ROOT / "docs" / "rigs.md").read_text()
+
+
+def _blocks(language: str, text: str = README) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
 
 
 def test_the_commands_succeed_in_the_order_given(tmp_path: Path) -> None:
     shutil.copytree(CONFIGS, tmp_path / "configs")
-    commands = [line for block in _blocks("sh") for line in block.splitlines()]
+    blocks = [*_blocks("sh"), *_blocks("sh", RIGS)]
+    commands = [line for block in blocks for line in block.splitlines()]
     gonio = [line.split()[1:] for line in commands if line.startswith("gonio ")]
-    assert len(gonio) >= 4
+    assert len(gonio) >= 9
     for arguments in gonio:
         if arguments[0] == "bench":  # takes minutes; tested in `tests/acquisition/benchmark`
             arguments = ["bench", "--help"]  # noqa: PLW2901 - only its help
@@ -46,7 +50,18 @@ def test_the_protocol_is_valid(tmp_path: Path) -> None:
     assert loaded.protocol.name == "plaster"
 
 
-def test_the_python_example_runs() -> None:
-    (block,) = _blocks("python")
-    done = subprocess.run([sys.executable, "-c", block], check=False, capture_output=True)
-    assert done.returncode == 0, done.stderr
+def test_the_python_examples_run_in_the_order_given(tmp_path: Path) -> None:
+    shutil.copytree(CONFIGS, tmp_path / "configs")
+    blocks = _blocks("python")
+    assert blocks
+    for block in blocks:
+        assert len(block.strip().splitlines()) <= 12
+        command = [sys.executable, "-W", "error", "-c", block]
+        done = subprocess.run(command, cwd=tmp_path, check=False, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "runs/python/brdf.png").stat().st_size > 10_000
+
+
+def test_the_readme_is_short_enough_to_be_read() -> None:
+    lines = README.splitlines()
+    assert len(lines) <= 130
