@@ -30,10 +30,10 @@ from sim.scene.scene import Scene
 from sim.scene.stage import SimulatedStage
 from tests.support.paths import CONFIGS
 from tests.support.stages.emulated_stages import LIMITS, MECHANICS
-from tests.support.stages.kinds import KINDS
+from tests.support.stages.kinds import KINDS, SERIAL
 from tests.support.stages.memory_stages import CountingClock, in_memory
 
-STAGES = ("simulated", "newport", "zaber", "oriental rtu")
+STAGES = ("simulated", *SERIAL)
 DEMO = load_protocol(CONFIGS / "protocols" / "demo.yaml")
 
 HOME_DEG, TOLERANCE_DEG = 0.0, 0.011  # the bench's, and half a microstep

@@ -13,20 +13,18 @@ from instrument.errors import DeviceError
 from sim.emulated.motor import Motor
 from sim.emulated.wire import PtyWire
 from tests.support.stages.emulated_stages import LIMITS, MECHANICS, SLOW
-from tests.support.stages.kinds import controller_for, open_stage
+from tests.support.stages.kinds import SERIAL, controller_for, open_stage
 from tests.support.stages.plug import Echoing
 from tests.support.stages.waiting import wait_until
 
 pytestmark = pytest.mark.waits
-
-KINDS = ("newport", "zaber", "oriental rtu")
 
 
 def opened(kind: str, wire: PtyWire) -> MotorStage:
     return open_stage(kind, wire.port, LIMITS, SystemClock())
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SERIAL)
 def test_a_stage_behind_an_echoing_adapter_homes_moves_and_stops(
     kind: str, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -45,7 +43,7 @@ def test_a_stage_behind_an_echoing_adapter_homes_moves_and_stops(
     assert sum("echo is skipped" in record.getMessage() for record in caplog.records) == 1
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SERIAL)
 def test_an_echo_is_not_taken_for_the_answer_of_a_dead_controller(kind: str) -> None:
     """An echoed write of one Modbus register looks like its acknowledgement."""
     motor = Motor(SLOW, SystemClock())

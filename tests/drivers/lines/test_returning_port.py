@@ -18,13 +18,12 @@ from sim.emulated.newport_controller import NewportController
 from sim.emulated.wire import PtyWire
 from sim.emulated.zaber_controller import ZaberController
 from tests.support.stages.emulated_stages import LIMITS, SLOW
-from tests.support.stages.kinds import controller_for, open_stage
+from tests.support.stages.kinds import SERIAL, controller_for, open_stage
 from tests.support.stages.plug import EventfulClock, Plug
 from tests.support.stages.waiting import wait_until
 
 pytestmark = pytest.mark.waits
 
-KINDS = ("newport", "zaber", "oriental rtu")
 SLOWLY = replace(
     LIMITS,
     speed_deg_per_s=SLOW.speed_deg_per_s,
@@ -51,7 +50,7 @@ class Setup:
             self.stage.wait()
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=SERIAL)
 def setup(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Setup]:
     made = Setup(request.param, tmp_path / "usb-adapter")
     yield made
@@ -89,7 +88,7 @@ def test_a_port_that_stays_away_is_an_error_after_2_s(setup: Setup) -> None:
 
 def test_three_ports_that_stay_away_take_as_long_as_one(tmp_path: Path) -> None:
     clock = EventfulClock(REOPEN_EVERY_S)
-    setups = [Setup(kind, tmp_path / kind, clock) for kind in KINDS]
+    setups = [Setup(kind, tmp_path / kind, clock) for kind in SERIAL]
     for setup in setups:
         setup.plug.pull_out()
     begun_s = clock.now_s()

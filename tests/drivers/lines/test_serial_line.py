@@ -18,6 +18,7 @@ from instrument.clock import SystemClock
 from instrument.errors import DeviceError
 from sim.emulated.wire import Fault
 from tests.support.stages.emulated_stages import EMULATED_STAGES, MECHANICS, SLOW, EmulatedStage
+from tests.support.stages.kinds import SERIAL
 
 pytestmark = pytest.mark.waits
 
@@ -45,7 +46,6 @@ FOR_GOOD = {
 
 
 # Faults of an AZ drive behind a gateway are tested in `test_modbus_bus`.
-SERIAL = [name for name in EMULATED_STAGES if name != "oriental tcp"]
 
 
 @pytest.fixture(params=SERIAL)

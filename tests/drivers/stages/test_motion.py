@@ -8,9 +8,9 @@ import pytest
 
 from instrument.errors import DeviceError
 from instrument.kinematics import Trapezoid
+from tests.support.stages.kinds import SERIAL
 from tests.support.stages.memory_stages import LIMITS, MECHANICS, MemoryStage, in_memory
 
-KINDS = ("newport", "zaber", "oriental rtu")
 ANGLES_DEG = {(20.0, 40.0): 15.0, (5.0, 400.0): 6.0, (100.0, 15.0): 7.0}  # each about 1.3 s
 ANGLE_DEG = ANGLES_DEG[20.0, 40.0]
 
@@ -28,7 +28,7 @@ def memory(
     return found
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SERIAL)
 @pytest.mark.parametrize(
     ("asked", "factor", "says"),
     [

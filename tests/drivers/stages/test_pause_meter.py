@@ -22,12 +22,11 @@ from sim.emulated.motor import Motor
 from sim.emulated.wire import Controller, Fault, PtyWire
 from tests.support.paths import ROOT
 from tests.support.stages.emulated_stages import LIMITS, SLOW
-from tests.support.stages.kinds import controller_for, open_stage
+from tests.support.stages.kinds import SERIAL, controller_for, open_stage
 from tests.support.stages.waiting import wait_until
 
 pytestmark = pytest.mark.waits
 
-KINDS = ("newport", "zaber", "oriental rtu")
 PAUSED_S = 1.3
 
 
@@ -88,7 +87,7 @@ class Setup:
         return self.stage.wait() == pytest.approx(target_deg, abs=1e-2)
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=SERIAL)
 def setup(request: pytest.FixtureRequest) -> Iterator[Setup]:
     made = Setup(request.param)
     yield made

@@ -10,10 +10,14 @@ import re
 
 import pytest
 
-MODULES = ("newport_controller", "oriental_controller", "zaber_controller", "v4l2.device")
+from tests.support.paths import ROOT
+
+CONTROLLERS = sorted(path.stem for path in (ROOT / "sim" / "emulated").glob("*_controller.py"))
+MODULES = (*CONTROLLERS, "v4l2.device")
 
 
 @pytest.mark.parametrize("module", MODULES)
 def test_each_emulated_controller_names_its_sources(module: str) -> None:
+    assert CONTROLLERS
     said = importlib.import_module(f"sim.emulated.{module}").__doc__ or ""
     assert re.search(r"Transcripts: .*Not verified on a (device|drive):", said, re.DOTALL)

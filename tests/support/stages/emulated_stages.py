@@ -12,7 +12,7 @@ from instrument.clock import SystemClock
 from instrument.devices import Stage
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.wire import PtyWire
-from tests.support.stages.kinds import KINDS, controller_for, open_stage
+from tests.support.stages.kinds import KINDS, Kind, controller_for, open_stage
 from tests.support.stages.modbus_tcp_gateway import TcpWire
 
 # Quick mechanics: tests wait for real motion. The controller's limits are wider on one side.
@@ -31,15 +31,13 @@ SLOW = replace(MECHANICS, speed_deg_per_s=20.0, acceleration_deg_per_s2=400.0)
 class EmulatedStage:
     """A stage under test and what is behind it.
 
-    `alarm`: a fault in its controller's own code; `stop`: the bytes of a stop. `max_deg`: the
-    narrower of the controller's limit and the rig file's.
+    `max_deg`: the narrower of the controller's limit and the rig file's.
     """
 
     stage: Stage
     motor: Motor
     wire: PtyWire | TcpWire
-    alarm: str
-    stop: bytes
+    kind: Kind
     moves: Callable[[], int]
     reopen: Callable[[], Stage] = field(repr=False)
     max_deg: float
@@ -59,9 +57,7 @@ def emulated(name: str, mechanics: Mechanics = MECHANICS) -> Iterator[EmulatedSt
     with (TcpWire if kind.tcp else PtyWire)([controller]) as wire:
         reopen = partial(open_stage, name, port_of(wire), limits, clock)
         max_deg = mechanics.max_deg if kind.keeps_limits else limits.max_deg
-        with_stage = EmulatedStage(
-            reopen(), motor, wire, kind.alarm, kind.stop, moves, reopen, max_deg
-        )
+        with_stage = EmulatedStage(reopen(), motor, wire, kind, moves, reopen, max_deg)
         yield with_stage
         with_stage.stage.close()
 

@@ -92,7 +92,7 @@ def run(pipe: int, folder: Path, hangs: str) -> None:
             main()
         except SystemExit as end:
             code = end.code
-        stops = [at_s for at_s, data in emulated.wire.seen if emulated.stop in data]
+        stops = [at_s for at_s, data in emulated.wire.seen if emulated.kind.stop in data]
         assert faults.scene is not None
         _say(pipe, json.dumps([code, stops, emulated.motor.moving, faults.scene.lit]))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from drivers.lines.modbus_bus import ModbusBus
 from drivers.lines.modbus_client import BusSettings
@@ -26,23 +26,35 @@ STEPS_PER_DEG = 1000.0
 
 @dataclass(frozen=True)
 class Kind:
-    """`alarm`: a fault in the controller's own code; `stop`: bytes of its stop command.
+    """One kind of stage, as far as the tests of all stages need to know it.
 
-    `keeps_limits`: the controller has limits of its own that can be read.
+    name: a word of its identity. alarm, at_limit: a fault, and that of a limit switch, in the
+    controller's own code as `Motor.fail` takes it. stop: bytes that occur only in its stop command.
+    tcp: behind a gateway. keeps_limits: the controller has limits of its own that can be read.
+    full_duplex: a stop need not wait for an answer that is pending.
     """
 
+    name: str
     alarm: str
+    at_limit: str
     stop: bytes
     tcp: bool = False
     keeps_limits: bool = True
+    full_duplex: bool = True
 
 
+_AZ = Kind(
+    name="AZ", alarm="30", at_limit="66", stop=bytes.fromhex("06007D0020"),
+    keeps_limits=False, full_duplex=False,
+)  # fmt: skip
 KINDS = {
-    "newport": Kind("0020", b"1ST"),
-    "zaber": Kind("FS", b" stop:"),
-    "oriental rtu": Kind("30", bytes.fromhex("06007D0020"), keeps_limits=False),
-    "oriental tcp": Kind("30", bytes.fromhex("06007D0020"), tcp=True, keeps_limits=False),
+    "newport": Kind(name="SMC100", alarm="0020", at_limit="0001", stop=b"1ST"),
+    "zaber": Kind(name="Zaber", alarm="FS", at_limit="FE", stop=b" stop:"),
+    "oriental rtu": _AZ,
+    "oriental tcp": replace(_AZ, tcp=True),
 }
+SERIAL = tuple(name for name, kind in KINDS.items() if not kind.tcp)
+"""Kinds on a serial line of their own."""
 
 
 def controller_for(kind: str, motor: Motor, clock: Clock) -> tuple[Controller, Callable[[], int]]:

@@ -56,7 +56,7 @@ def _stops(emulated: EmulatedStage, moment: list[float]) -> list[float]:
     return [
         at
         for at, data in emulated.wire.seen
-        if moment and at >= moment[0] and emulated.stop in data
+        if moment and at >= moment[0] and emulated.kind.stop in data
     ]
 
 

@@ -80,13 +80,12 @@ STOPS: dict[str, tuple[MakeFail, str]] = {
     "truncate permanently": (permanently(Fault("truncate")), "answer|only"),
     "requests lost permanently": (permanently(Fault("lose request")), "no answer|not answer"),
     "unplug": (once(Fault("unplug")), "is gone|cannot open|lost|answer"),
-    "alarm": (lambda emulated: emulated.motor.fail(emulated.alarm), "."),
+    "alarm": (lambda emulated: emulated.motor.fail(emulated.kind.alarm), "."),
     "limit switch": (
-        lambda emulated: emulated.motor.fail(AT_LIMIT[emulated.alarm]),
+        lambda emulated: emulated.motor.fail(emulated.kind.at_limit),
         "limit|overtravel|end of run",
     ),
 }  # fmt: skip
-AT_LIMIT = {"0020": "0001", "FS": "FE", "30": "66"}  # limit code by `EmulatedStage.alarm`
 # Faults that the engine's next action may remove without a report.
 MOTOR: dict[str, MakeFail] = {
     "stall": lambda emulated: emulated.motor.hold(),

@@ -9,11 +9,12 @@ import pytest
 
 from tests.support.paths import ROOT
 from tests.support.stages.emulated_stages import EMULATED_STAGES
+from tests.support.stages.kinds import KINDS
 
 pytestmark = pytest.mark.real_time
 
 # On a half-duplex line a reply may be pending: one reply time-out more.
-BOUND_S = {"newport": 0.1, "zaber": 0.1, "oriental rtu": 0.3, "oriental tcp": 0.3}
+BOUND_S = {name: 0.1 if kind.full_duplex else 0.3 for name, kind in KINDS.items()}
 CAUSES = {"SIGINT": "KeyboardInterrupt", "SIGTERM": "KeyboardInterrupt", "exception": "DeviceError"}
 
 
