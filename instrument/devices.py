@@ -20,7 +20,7 @@ Controllers answer within 10 to 50 ms. A stop waits no longer than this, and a l
 for again before the status of a moving stage is too old.
 """
 Surface = Literal["sample", "white tile"]
-CHANGING_SETTINGS = frozenset({"exposure", "frame period"})
+CHANGING_SETTINGS = frozenset({"exposure", "frame period", "frame numbers"})
 """Settings of a camera that differ during a scan, or are measured anew when it is opened."""
 
 

@@ -74,7 +74,10 @@ def overhead(folder: Path) -> Seconds:
 def test_the_demonstration_costs_a_few_times_the_import_of_its_libraries(
     tmp_path: Path, slow: bool, record_property: Callable[[str, object], None]
 ) -> None:
-    """Measured on one core of 2 GHz: 3.0 s, of which the libraries' imports are 0.70 s."""
+    """Measured on one core of 2 GHz: 4.8 s, of which the libraries' imports are 0.78 s.
+
+    The interlocks take 1.7 s of it, 15 ms for each series of frames: they look at its picture.
+    """
     found = []
     for n in range(5 if slow else 1):
         (tmp_path / str(n)).mkdir()
@@ -85,4 +88,4 @@ def test_the_demonstration_costs_a_few_times_the_import_of_its_libraries(
     for name, value in figures.items():
         record_property(name, f"{value:.2f}")
         sys.stdout.write(f"{name} {value:.2f}\n")
-    assert cpu_s < 5.5 * libraries
+    assert cpu_s < 8 * libraries
