@@ -38,8 +38,8 @@ REFERENCE_FRAMES = 4
 class Excess:
     """Counts of a dark in DN that neither black level nor dark current explains.
 
-    found_dn: their amount, of either sign. tolerated_dn: what noise and the rig file's dark current
-    leave open. limit_dn: more is an interlock.
+    found_dn: their amount, of either sign. tolerated_dn: what noise leaves open. limit_dn: more is
+    an interlock; it also leaves room for a sensor that is warmer than the rig file's dark current.
     """
 
     exposure_s: float
@@ -49,7 +49,7 @@ class Excess:
 
     @property
     def light_dn(self) -> float:
-        """Light in the dark, beyond what is tolerated."""
+        """Light that may be in the dark: a warmer sensor would explain it as well."""
         return max(abs(self.found_dn) - self.tolerated_dn, 0.0)
 
     @property
@@ -107,12 +107,12 @@ class DarkCheck:
         white_per_s = self.rig.lamp.white_electrons_per_s / camera.electrons_per_dn
         scale = exposure_s / apart_s
         tolerated = (_COVERAGE * u + _WANDER_DN + open_dn) * abs(scale)
-        tolerated += (_HOTTER - 1) * per_s * exposure_s
+        warmer_per_s = (_HOTTER - 1) * per_s
         return Excess(
             exposure_s,
             found_dn=(rise - per_s * apart_s) * scale,
             tolerated_dn=tolerated,
-            limit_dn=tolerated + MOST_LIGHT * white_per_s * exposure_s,
+            limit_dn=tolerated + (warmer_per_s + MOST_LIGHT * white_per_s) * exposure_s,
         )
 
 

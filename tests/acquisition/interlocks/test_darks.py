@@ -74,6 +74,19 @@ def test_a_warm_camera_with_another_black_level_is_accepted_and_light_is_not(
     assert bad.found_dn == pytest.approx(leak * exposure_s / camera.electrons_per_dn, rel=0.3)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_light_that_a_warmer_sensor_would_explain_is_uncertain(seed: int) -> None:
+    """A leak on a dark sample needs a long exposure, in which a warm sensor has as many counts."""
+    rig = rig_of("paper_1995")
+    stated, exposure_s = rig.camera.dark_current_electrons_per_s, 0.4
+    check = DarkCheck(rig)
+    check.set_reference([dark(rig, rig.camera.min_exposure_s, 3 * stated, 0.0, seed)])
+    found = check.excess(dark(rig, exposure_s, 3 * stated, 0.0, seed), window(rig))
+    beyond_dn = 2 * stated * exposure_s / rig.camera.electrons_per_dn
+    assert not found.is_too_much
+    assert 0.7 * beyond_dn < found.light_dn <= beyond_dn
+
+
 def test_a_camera_with_one_exposure_is_compared_with_the_rig_files_black_level() -> None:
     loaded = small_scan()
     camera = loaded.rig.camera.model_copy(update={"max_exposure_s": 0.0005})
