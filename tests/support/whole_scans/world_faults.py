@@ -69,6 +69,7 @@ ATTACKS = (
 _UNTIED = "nothing ties the tile's pictures to the first drift check, after the swap"
 _PASSED = "a whole point between two drift checks, whose frames agree with one another"
 _ONE_LAMP = "a wrong angle from the beginning shows only where the tile is seen at two incidences"
+_BARE = "a bare table looks like a dark sample without edges"
 _NO_AZIMUTH = "neither tile nor outline shows the lamp's azimuth"
 UNSEEN = {
     "lamp dies after the tile": _UNTIED,
@@ -82,4 +83,5 @@ UNSEEN = {
     "hand in the beam": _PASSED,
     "theta_i set wrong": _ONE_LAMP,
     "dphi slips": _NO_AZIMUTH,
+    "tile on the table at the resume": _BARE,
 }

@@ -98,4 +98,4 @@ def test_no_point_is_wrong_without_a_flag(
 
 
 def test_the_unseen_attacks_are_among_all() -> None:
-    assert set(UNSEEN) <= {attack.name for attack in ATTACKS}
+    assert set(UNSEEN) <= {attack.name for attack in (*ATTACKS, *AT_RESUME)}
