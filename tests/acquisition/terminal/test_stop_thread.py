@@ -33,6 +33,7 @@ def stop():
 
 stop_signals.begin()
 with orderly_end(), stopped_by_signals({"theta_r": stop}), open(sys.argv[2], "w") as file:
+    os.write(int(sys.argv[1]), b"ready\\n")  # imports may wait for the disk as well
     os.fsync(file.fileno())
 """
 
@@ -52,6 +53,7 @@ def hanging(trouble: str, hung_disk: dict[str, str], tmp_path: Path) -> Iterator
         patience = threading.Timer(DEADLINE_S, process.kill)
         patience.start()
         try:
+            assert said.readline() == "ready\n"
             wait_until(lambda: _waits_for_disk(process.pid), DEADLINE_S)
             yield process, said, printed
         finally:
