@@ -122,8 +122,8 @@ def test_an_error_of_the_driver_is_survived(vivid: None, name: str) -> None:
 
 
 def test_dropped_buffers_cost_only_time(vivid: None) -> None:
+    set_control("Percentage of Dropped Buffers", 60)  # later it would be another program's change
     with V4l2Camera(SETTINGS, SystemClock()) as camera:
-        set_control("Percentage of Dropped Buffers", 60)
         assert len(camera.grab(4)) == 4
 
 
