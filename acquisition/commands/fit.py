@@ -16,7 +16,7 @@ from acquisition.terminal.layout import table_lines, wrapped
 from acquisition.terminal.progress import sign_of_life
 from analysis.choice.choice import Choice, choose
 from analysis.choice.fit_json import to_json
-from analysis.choice.ladder import METHODS, MethodOfFit
+from analysis.choice.ladder import METHODS, MethodOfFit, method_named
 from analysis.fit.fit import FitResult
 from instrument.errors import InputError
 from instrument.text.quoting import printable
@@ -66,14 +66,14 @@ def _names(models: str | None) -> list[str] | None:
 
 def _method(method: str, models: str | None) -> MethodOfFit:
     """Method for rough surfaces; only `auto` goes with --models, whose names imply the method."""
-    for known in METHODS:
-        if method == known:
-            if models is not None and known != "auto":
-                raise InputError(
-                    f"--method: {method}; allowed: auto, as the names in --models imply the method"
-                )
-            return known
-    raise InputError(f"--method: {method}; allowed: {', '.join(METHODS)}")
+    known = method_named(method)
+    if known is None:
+        raise InputError(f"--method: {method}; allowed: {', '.join(METHODS)}")
+    if models is not None and known != "auto":
+        raise InputError(
+            f"--method: {method}; allowed: auto, as the names in --models imply the method"
+        )
+    return known
 
 
 def parse_u_shared(text: str | None) -> float | None:

@@ -10,14 +10,14 @@ import numpy as np
 
 from acquisition.notebook.figures import Points, brdf_figure
 from acquisition.results.fitting import Fitted
+from acquisition.results.model_check import check_model
 from acquisition.results.summary import VERDICTS, parameters_of, value_text
 from analysis.choice.choice import Choice, choose
 from analysis.choice.fit_json import to_json
-from analysis.choice.ladder import METHODS
+from analysis.choice.ladder import METHODS, method_named
 from analysis.data.acceptance import Acceptance
 from analysis.data.measurements import Measurements
 from analysis.fit.fit import FitResult
-from analysis.models import MODELS
 from analysis.report.style import escaped
 from instrument.errors import InputError
 from instrument.geometry import BoolArray
@@ -174,20 +174,18 @@ def fit_of(
     return Fit(choice, measurements, points, all_points if used is None else used)
 
 
-def _method(method: str) -> MethodOfFit:
-    for known in METHODS:
-        if method == known:
-            return known
-    raise InputError(f"method: {method!r}; allowed: {', '.join(METHODS)}")
+def _method(text: str) -> MethodOfFit:
+    method = method_named(text)
+    if method is None:
+        raise InputError(f"method: {text!r}; allowed: {', '.join(METHODS)}")
+    return method
 
 
 def _names(models: Sequence[str]) -> list[str]:
     names = [models] if isinstance(models, str) else list(models)
-    for name in names:
-        try:
-            MODELS[name]
-        except KeyError as error:
-            raise InputError(f"models: {error.args[0]}") from None
+    wrong = [words for words in (check_model(name, None) for name in names) if words]
+    if wrong:
+        raise InputError(*(f"models: {words}" for words in wrong))
     return names
 
 

@@ -66,6 +66,11 @@ _BY_METHOD = {
 METHODS: tuple[MethodOfFit, ...] = get_args(MethodOfFit)
 
 
+def method_named(text: str) -> MethodOfFit | None:
+    """Method of that name, or None."""
+    return next((method for method in METHODS if method == text), None)
+
+
 def rungs(names: Iterable[str]) -> list[tuple[str, ...]]:
     """Names grouped by their models' number of parameters, fewest first; else in their order."""
     ordered = sorted(names, key=_size)

@@ -139,8 +139,7 @@ def test_a_controller_that_obeys_no_stop_is_told_its_harder_one_or_reported(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found, stage = slow_stage(kind, monkeypatch)
-    stage.start_move(80.0)
-    found.clock.sleep(1.0)
+    under_way(found, stage, "moving")
     monkeypatch.setattr(found.motor, "stop", lambda: None)
     begun_s = found.clock.now_s()
     if kind == "zaber":
@@ -160,8 +159,7 @@ def test_a_stop_that_cannot_be_read_back_is_an_error_in_a_bounded_time(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found, stage = slow_stage(kind, monkeypatch)
-    stage.start_move(80.0)
-    found.clock.sleep(1.0)
+    under_way(found, stage, "moving")
     found.wire.spoil = lambda _: b""
     begun_s = found.clock.now_s()
     with pytest.raises(NoReply, match=r"theta_r: .* not read to stand after .* it may still move"):
@@ -175,8 +173,7 @@ def test_a_pause_of_the_computer_in_a_stop_does_not_make_it_fail(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found, stage = slow_stage(kind, monkeypatch)
-    stage.start_move(80.0)
-    found.clock.sleep(1.0)
+    under_way(found, stage, "moving")
     stage.begin_stop()
     found.clock.sleep(5.0)
     stage.finish_stop()
