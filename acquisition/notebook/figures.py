@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from acquisition.results.fitting import Fitted
 from acquisition.results.report_inputs import candidates
-from analysis.report.charts import brdf_drawing
+from analysis.report.charts import brdf_drawing, model_handles
 from analysis.report.data import ReportData
 from analysis.report.style import drawn_in
 from analysis.report.sweeps import group_sweeps
@@ -73,4 +73,8 @@ def brdf_figure(points: Points, fitted: Fitted | None) -> Figure:
     sweeps = group_sweeps(data)
     if not sweeps:
         raise NoMeasurement("no point has a value: there is nothing to draw")
-    return drawn_in(ShownFigure, brdf_drawing(sweeps, data.quantity))
+    figure = drawn_in(ShownFigure, brdf_drawing(sweeps, data.quantity))
+    if data.plotted:
+        names = [candidate.name for candidate in data.plotted]
+        figure.axes[0].legend(handles=model_handles(names), frameon=False, fontsize=8)
+    return figure

@@ -20,6 +20,7 @@ from instrument.geometry import FloatArray
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 # More would be too small to read and slow to draw.
 MAX_SWEEPS = 12
@@ -212,6 +213,15 @@ def _residual_panel(
         ax.plot(sweep.x_deg, sweep.residual, ls="", ms=3.4, c=colour, marker=marker)
     if set_symmetric_axis(ax, [s.residual for s in sweeps], 3.5) < 8:
         ax.set_yticks([-2, 0, 2])
+
+
+def model_handles(names: Sequence[str]) -> list[Line2D]:
+    """Entries of a legend for the models' lines in the panels of the BRDF, the chosen one first."""
+    from matplotlib.lines import Line2D
+
+    styles = [(INK, "-"), *((GREY, dashes) for dashes in _RUNNER_UP)]
+    pairs = zip(names, styles, strict=False)
+    return [Line2D([], [], c=c, ls=dashes, label=name) for name, (c, dashes) in pairs]
 
 
 def _brdf_panel(ax: Axes, sweep: PlottedSweep) -> None:

@@ -54,6 +54,16 @@ def test_one_line_and_a_table_name_model_verdict_and_values() -> None:
     assert {c.model for c in found.candidates} == {"lambert", "oren_nayar"}
 
 
+def test_the_legend_names_each_model_that_is_drawn() -> None:
+    found = fit(_lambertian(1), ["lambert", "oren_nayar"])
+    assert found.best is not None
+    legend = found.plot().axes[0].get_legend()
+    assert legend is not None
+    names = [text.get_text() for text in legend.get_texts()]
+    assert names[0] == found.best.model
+    assert set(names) == {"lambert", "oren_nayar"}
+
+
 def test_relative_values_are_drawn_in_their_own_unit() -> None:
     ax = fit(_lambertian(2, relative=True), ["lambert"]).plot().axes[0]
     assert "radiance" in ax.get_ylabel()
