@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 
 from acquisition.measure.drift import (
     JUMP_U,
+    MIN_JUMP,
     MIN_SIGNAL_U,
     Drift,
     is_misplaced,
@@ -18,6 +19,7 @@ from acquisition.measure.drift import (
     u_unknown_trend,
 )
 from acquisition.measure.placement import Placement
+from instrument.config.axes import HandAxis
 from instrument.config.rig import Rig
 from instrument.record.reading import Reading
 
@@ -71,6 +73,38 @@ def angle_doubt(tile: Reading, other: Reading, drifts: Mapping[int, Drift], rig:
         f"{other.theta_i_deg:g} deg; expected by the cosine law: {expected:.3g} within "
         f"{100 * allowed:.2g} %; both settings are measured again"
     )
+
+
+def repeat_doubt(tile: Reading, before: Reading, drift: Drift, rig: Rig) -> str:
+    """Return why a reading of the tile contradicts one by the same lamp setting, empty if not.
+
+    Between the two somebody has put the sample on the table, and the tile again. `drift`: of the
+    lamp in their block.
+    """
+    if before.flags or not before.signal_dn > 0:
+        return ""
+    found = _ratio(tile, before, [drift, drift])
+    u = math.hypot(*(_u_repeated(r, drift, rig) for r in (tile, before)))
+    if not drift.segments:
+        u = math.hypot(u, u_unknown_trend(tile.time_s - before.time_s))
+    allowed = MIN_JUMP + _COVERAGE * u
+    if abs(math.log(found)) <= allowed:
+        return ""
+    return (
+        f"white tile at theta_i {tile.theta_i_deg:g} deg: {found:.3g} times the light that it gave "
+        f"before; expected: as much within {100 * allowed:.2g} %, but for the drift that was seen; "
+        "all that was measured between is measured again"
+    )
+
+
+def _u_repeated(tile: Reading, drift: Drift, rig: Rig) -> float:
+    """Return the relative standard uncertainty of a reading that is repeated by the same lamp."""
+    names = ("u_noise_dn", "u_quantisation_dn", "u_texture_dn", "u_dark_dn", "u_placement_dn")
+    own = [getattr(tile, name) / tile.signal_dn for name in names]
+    lamp = rig.axes.theta_i
+    u_deg = 0.0 if isinstance(lamp, HandAxis) else lamp.u_deg  # one set by hand stays
+    by_angle = math.radians(u_deg) * math.tan(math.radians(tile.theta_i_deg))
+    return math.hypot(*own, by_angle, drift.u_extrapolated(tile.time_s))
 
 
 def _ratio(tile: Reading, other: Reading, drifts: Sequence[Drift]) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from acquisition.interlocks.lamp_checks import check_text, compared, failed, stopped_check
-from acquisition.interlocks.reference_level import angle_doubt, level_doubt
+from acquisition.interlocks.reference_level import angle_doubt, level_doubt, repeat_doubt
 from acquisition.measure.drift import Drift, rate
 from instrument.config.rig import Rig
 from instrument.record.reading import Check, Reading
@@ -47,8 +47,11 @@ class References:
                 return f"drift check: {check_text(check)}"
         if level := level_doubt(reading, self.rig):
             return f"light: {level}"
-        _, angle = self._contradicting(reading)
-        return f"lamp angle: {angle}" if angle else ""
+        other, text = self._contradicting(reading)
+        if other is None:
+            return ""
+        again = other.lamp_setting == reading.lamp_setting
+        return f"white tile: {text}" if again else f"lamp angle: {text}"
 
     def failed_checks(self, reading: Reading) -> list[Check]:
         """Return the checks to record, which make earlier readings doubtful.
@@ -81,14 +84,22 @@ class References:
         blocks = {r.block for r in (*self.readings, reading)}
         drifts = {block: Drift.of(self.readings, block, self.checks) for block in blocks}
         for other in self._comparable(reading):
-            if text := angle_doubt(reading, other, drifts, self.rig):
+            if other.lamp_setting == reading.lamp_setting:
+                text = repeat_doubt(reading, other, drifts[reading.block], self.rig)
+            else:
+                text = angle_doubt(reading, other, drifts, self.rig)
+            if text:
                 return other, text
         return None, ""
 
     def _comparable(self, tile: Reading) -> list[Reading]:
-        """Return the readings of the tile by the same lamp, or one that drift checks connect."""
+        """Return the readings of the tile by the same lamp, or one that drift checks connect.
+
+        That of the same setting of the lamp comes first: it tells most.
+        """
         tiles = [r for r in self.readings if r.kind == "tile"]
-        return [r for r in tiles if r.block == tile.block or r.step in self._unbroken]
+        known = [r for r in tiles if r.block == tile.block or r.step in self._unbroken]
+        return sorted(known, key=lambda r: r.lamp_setting != tile.lamp_setting)
 
 
 def what_to_look_at(reading: Reading) -> str:

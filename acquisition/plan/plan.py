@@ -131,8 +131,11 @@ def _serpentine(axes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
 def _ordered_steps(poses: Sequence[Pose], protocol: Protocol, rig: Rig) -> list[Step]:
     """Return points and references block by block; tile and sample are swapped once a block.
 
-    A block holds all points, of whichever sweep, that share one setting of the lamp by hand.
+    A block holds all points, of whichever sweep, that share one setting of the lamp by hand. With
+    `again_at_end` it begins and ends with the tile.
     """
+    tile = protocol.references.white_tile
+    closed = tile is not None and tile.again_at_end
     by_hand = [n for n in ("theta_i", "dphi") if isinstance(rig.axes[n], HandAxis)]
     numbers: dict[tuple[int, float, float], int] = {}
     steps: list[Step] = []
@@ -140,8 +143,9 @@ def _ordered_steps(poses: Sequence[Pose], protocol: Protocol, rig: Rig) -> list[
     for pose in poses:
         blocks.setdefault(tuple(getattr(pose, name) for name in by_hand), []).append(pose)
     for block, group in enumerate(blocks.values()):
-        sample, tile = _block(group, protocol)
-        for kind, pose in [*tile, *sample] if block % 2 == 0 else [*sample, *tile]:
+        sample, white = _block(group, protocol)
+        first, then = (white, sample) if closed or block % 2 == 0 else (sample, white)
+        for kind, pose in [*first, *then, *(white if closed else [])]:
             setting = numbers.setdefault((block, pose.theta_i, pose.dphi), len(numbers))
             steps.append(_step(len(steps), kind, pose, setting, block, protocol, rig))
     return steps

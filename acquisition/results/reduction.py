@@ -158,8 +158,8 @@ def reduce(
     placements = _placements(sorted(readings, key=lambda r: r.time_s))
     tiles = {
         r.lamp_setting: _tile(r, drifts[r.block], placements[r.step], doubts)
-        for r in readings
-        if r.kind == "tile"
+        for r in sorted(readings, key=lambda r: -r.step)
+        if r.kind == "tile"  # the first of each setting; one at its end only confirms it
     }
     radiance = np.array([rate(p) / drifts[p.block].at(p.time_s) for p in points])
     tile = protocol.references.white_tile

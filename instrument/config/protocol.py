@@ -129,7 +129,8 @@ class WhiteTile(Section):
     """Reference diffuser of known reflectance, measured at every position of the lamp.
 
     `width_mm` and `height_mm` of a thin rectangular tile: its edges in the picture are compared
-    with the pose of the rig. Without them they are not.
+    with the pose of the rig. Without them they are not. `again_at_end`: the tile is read once more
+    after the points of each setting of the lamp by hand, which must agree; one more swap for each.
     """
 
     reflectance: Annotated[float, Field(gt=0, le=1)]
@@ -138,6 +139,7 @@ class WhiteTile(Section):
     frames: Annotated[int, Field(ge=1, le=10_000)] = 16
     width_mm: SampleSize | None = None
     height_mm: SampleSize | None = None
+    again_at_end: bool = False
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
         """Require both sizes or none, and refuse half the reflectance as u: probably in %."""

@@ -68,7 +68,7 @@ def scans(draw: st.DrawFn) -> Loaded:
         st.none()
         | st.builds(
             WhiteTile, reflectance=st.just(0.99), u_reflectance=st.just(0.005),
-            theta_r_deg=reference_deg,
+            theta_r_deg=reference_deg, again_at_end=st.booleans(),
         )
     )  # fmt: skip
     drift = draw(

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from acquisition.interlocks.lamp_checks import UNPROVEN
-from acquisition.interlocks.reference_level import angle_doubt, level_doubt
+from acquisition.interlocks.reference_level import angle_doubt, level_doubt, repeat_doubt
 from acquisition.measure.drift import Drift
 from acquisition.measure.placement import Placement
 from acquisition.results.reduction import reduce
 from instrument.config.load import Loaded
+from instrument.config.protocol import References
 from instrument.config.rig import Rig
 from instrument.errors import Interlock
 from instrument.record.reading import Reading
@@ -136,3 +137,71 @@ def test_a_lamp_that_drifts_fast_is_no_wrong_angle(record: Record) -> None:
     loaded = small_scan("paper_1995")
     simulation = loaded.rig.simulation.model_copy(update={"lamp_drift_per_hour": -0.1})
     scan(changed(loaded, rig={"simulation": simulation}), record)
+
+
+def _read_again(name: str) -> Loaded:
+    """A small scan whose tile is read once more at the end of each setting of the lamp by hand."""
+    loaded = small_scan(name)
+    own = loaded.protocol.references
+    assert own.white_tile is not None
+    tile = own.white_tile.model_copy(update={"again_at_end": True})
+    return changed(loaded, references=References(white_tile=tile, drift_check=own.drift_check))
+
+
+@pytest.mark.parametrize("rig_name", RIGS)
+@pytest.mark.parametrize("seed", range(20))
+def test_the_tile_at_the_end_may_differ_by_what_uncertainties_explain(
+    rig_name: str, seed: int
+) -> None:
+    """Noise and placement at random; a change of 2 % or more that nothing explains is told."""
+    random, rig = np.random.default_rng(seed), rig_of(rig_name)
+    theta_i, constant = float(random.uniform(0, 70)), Drift((), np.nan)
+    before, after = (tile(rig_name, theta_i, 1.0) for _ in range(2))
+    u = Placement(rig.u_placement_mm, theta_i, rig.lamp_distance_mm).u_irradiance
+    before, after = (
+        replace(r, u_placement_dn=u * r.signal_dn,
+                signal_dn=r.signal_dn * (1 + u * random.standard_normal()))
+        for r in (before, after)
+    )  # fmt: skip
+    after = replace(after, time_s=float(random.uniform(5, 600)))
+    assert not repeat_doubt(after, before, constant, rig)
+    changed_by = float(random.choice([-1, 1])) * (0.05 + 15 * u)
+    found = repeat_doubt(
+        replace(after, signal_dn=before.signal_dn * (1 + changed_by)), before, constant, rig
+    )
+    assert "times the light that it gave before" in found
+
+
+@pytest.mark.parametrize("rig_name", RIGS)
+def test_a_sound_scan_has_the_same_values_with_the_tile_at_the_end(
+    rig_name: str, record: Record, tmp_path: Path
+) -> None:
+    scan(_read_again(rig_name), record)
+    with Record.create(tmp_path / "once", {}) as other:
+        scan(small_scan(rig_name), other)
+        once = reduce(other.readings(), small_scan(rig_name).protocol, ())
+    found = reduce(record.readings(), _read_again(rig_name).protocol, record.checks())
+    assert not any(found.flags)
+    assert found.brdf == pytest.approx(once.brdf, rel=0.01)
+
+
+@pytest.mark.parametrize("rig_name", RIGS)
+@pytest.mark.parametrize("level", [0.97, 0.02])
+def test_a_lamp_that_changes_after_the_tile_is_told_by_the_tile_at_the_end(
+    rig_name: str, level: float, record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The drift checks all come after the change: they agree with one another."""
+    loaded = _read_again(rig_name)
+    with Record.create(tmp_path / "good", {}) as other:
+        scan(loaded, other)
+        good = reduce(other.readings(), loaded.protocol, ())
+        first = next(r.step for r in other.readings() if r.kind == "drift")
+    fault = LampFault(at_step={first: level}).install(monkeypatch)
+    with pytest.raises(Interlock, match=r"white tile: white tile at|light: white tile at"):
+        scan(loaded, record)
+    assert all(reduce(record.readings(), loaded.protocol, record.checks()).flags)
+    fault.at_step = None
+    scan(loaded, record)
+    found = reduce(record.readings(), loaded.protocol, record.checks())
+    assert not any(found.flags)
+    assert found.brdf == pytest.approx(good.brdf, rel=5e-3)

@@ -106,6 +106,18 @@ def test_every_point_has_a_white_tile_reading_under_the_same_lamp(by_hand: Loade
         assert (tile.block, tile.pose.theta_i) == (step.block, step.pose.theta_i)
 
 
+def test_a_tile_that_is_read_again_encloses_each_block(demo: Loaded, by_hand: Loaded) -> None:
+    tile = TILE.model_copy(update={"again_at_end": True})
+    for loaded, swaps in ((demo, 3), (by_hand, 7)):
+        plan = make_plan(changed(loaded, references=References(white_tile=tile)))
+        assert plan.swaps == swaps
+        for _, block in groupby(plan.steps, lambda step: step.block):
+            kinds = [(kind, [s.pose for s in steps]) for kind, steps in
+                     groupby(block, lambda step: step.kind)]  # fmt: skip
+            assert [kind for kind, _ in kinds] == ["tile", "point", "tile"]
+            assert kinds[0][1] == kinds[2][1]
+
+
 def test_drift_checks_enclose_the_points_and_repeat_one_geometry(demo: Loaded) -> None:
     steps = [s for s in make_plan(demo).steps if s.surface == "sample"]
     checks = [n for n, s in enumerate(steps) if s.kind == "drift"]
@@ -229,8 +241,9 @@ def the_references_are_as_promised(plan: Plan, loaded: Loaded) -> None:
     settings_ = {step.lamp_setting: step.pose[:2] for step in plan.points}
     if tile is None:
         assert not tiles
-    else:  # one reading of the tile for every position of the lamp, in the same setting by hand
-        assert Counter(step.lamp_setting for step in tiles) == Counter(list(settings_))
+    else:  # one or two readings for every position of the lamp, in the same setting by hand
+        times = 1 + tile.again_at_end
+        assert Counter(step.lamp_setting for step in tiles) == Counter(times * list(settings_))
         block = {step.lamp_setting: step.block for step in plan.points}
         for step in tiles:
             assert step.pose == Pose(*settings_[step.lamp_setting], tile.theta_r_deg)

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import yaml
 
+from acquisition.plan.plan import make_plan
 from instrument.config.camera import CameraDefects, HotPixel
 from instrument.config.load import Loaded, load_protocol
 from instrument.config.protocol import (
@@ -26,7 +27,6 @@ from tests.support.whole_scans.simulated_rig import simulated
 RIGS = ("bench_12bit", "paper_1995", "emulated")
 KINDS = ("matt", "gloss", "dark", "ggx")
 _TILE_MM = 40.0
-_WARM_UP_GRABS = 40  # in which a warming lamp comes within 1/e of its final level
 
 
 @cache
@@ -43,6 +43,7 @@ def random_scan(
 ) -> Loaded:
     """Return a scan of 7 to 18 geometries drawn from `seed`; of a tile and with drift checks.
 
+    With an even seed the tile is read again at the end of each setting of the lamp by hand.
     kind: of the sample, one of `KINDS`. shrink: rows and columns of the camera are divided by it.
     """
     random = np.random.default_rng([seed, zlib.crc32(rig.encode())])
@@ -64,7 +65,7 @@ def random_scan(
         frames_per_point=frames,
         dark_frames=int(random.choice([4, 8, 16])),
         exposure_target=float(random.choice([0.4, 0.7, 0.8])),
-        references=_references(random),
+        references=_references(random, again_at_end=seed % 2 == 0),
         simulated_sample=_sample(kind or str(random.choice(KINDS)), random),
     )
 
@@ -112,7 +113,7 @@ def _rig(rig: Rig, random: np.random.Generator, seed: int, shrink: int) -> dict[
     return {"camera": camera, "simulation": simulation}
 
 
-def _references(random: np.random.Generator) -> References:
+def _references(random: np.random.Generator, again_at_end: bool) -> References:
     tile = WhiteTile(
         reflectance=0.99,
         u_reflectance=0.005,
@@ -120,6 +121,7 @@ def _references(random: np.random.Generator) -> References:
         frames=int(random.choice([4, 16])),
         width_mm=_TILE_MM,
         height_mm=_TILE_MM,
+        again_at_end=again_at_end,
     )
     drift = DriftCheck(theta_r_deg=10.0, every_points=int(random.choice([3, 5, 8])))
     return References(white_tile=tile, drift_check=drift)
@@ -149,10 +151,16 @@ def without_references(loaded: Loaded, tile: bool, drift: bool) -> Loaded:
     return changed(loaded, references=kept)
 
 
-def warming_lamp(share: float, grabs: int) -> Faults:
-    """Lamp that is brighter by `share` at the end than at the first of so many calls of grab."""
-    faults = Faults()
-    for n in range(1, grabs + 1):
-        level = 1.0 - share * float(np.exp(-n / _WARM_UP_GRABS))
-        faults.plan_world("lamp", f"{level:.6f}", "at", "camera.grab", n)
+def warming_lamp(share: float, loaded: Loaded) -> Faults:
+    """Lamp that is darker by `share` when a scan begins, and by 1/e of it after a third of the scan.
+
+    Its output changes with each reading, to the level at the planned beginning of the next step.
+    """
+    plan, faults = make_plan(loaded), Faults()
+    for n, step in enumerate(plan.steps):
+        level = 1.0 - share * float(np.exp(-3.0 * step.start_s / plan.duration_s))
+        if n == 0:
+            faults.plan_world("lamp", f"{level:.6f}", "at", "camera.grab", 1)
+        else:
+            faults.plan_world("lamp", f"{level:.6f}", "after", "record.add_reading", n)
     return faults

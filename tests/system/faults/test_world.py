@@ -36,13 +36,13 @@ AT_RESUME = (
         "tile on the table at the resume", "mounted", ("white tile", "nothing"), always, OUTLINE
     ),
 )
-WARM_UP = 0.01  # of the lamp's output, within a third of a scan
+WARM_UP = 0.01  # of the lamp's output
 
 
 def _false_alarms(rig: str, seed: int, folder: Path, shrink: int) -> list[str]:
     """Errors and flags of a sound scan; every fifth has a lamp that warms up."""
     loaded = random_scan(rig, seed, shrink=shrink)
-    faults = warming_lamp(WARM_UP, 300) if seed % 5 == 0 else None
+    faults = warming_lamp(WARM_UP, loaded) if seed % 5 == 0 else None
     result = scanned(loaded, folder, faults)
     if result.error is not None:
         return [f"{rig} {seed}: {result.error}"]
