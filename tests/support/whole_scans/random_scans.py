@@ -152,7 +152,7 @@ def without_references(loaded: Loaded, tile: bool, drift: bool) -> Loaded:
 
 
 def warming_lamp(share: float, loaded: Loaded) -> Faults:
-    """Lamp that is darker by `share` when a scan begins, and by 1/e of it after a third of the scan.
+    """Lamp that is darker by `share` at the beginning, and by 1/e of that after a third of a scan.
 
     Its output changes with each reading, to the level at the planned beginning of the next step.
     """
