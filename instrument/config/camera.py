@@ -151,6 +151,11 @@ class CameraDefects(Section):
     exposure that the camera reports, the one set (like uvcvideo, which answers from its cache) or
     the one taken. `limited_range`: 8-bit counts have black at 16 and white at 235; a YUYV camera
     declares it to the driver or not.
+
+    Response, with black and full scale unchanged: `gamma`: counts go with the light to the power of
+    1/gamma. `nonlinearity`: relative excess of the counts of a small signal, which falls linearly
+    to 0 at full scale. Pixels, drawn from the rig's seed: `prnu`: relative standard deviation of
+    their responses to light. `dsnu_electrons`: standard deviation of their dark signals.
     """
 
     fixed_exposure_s: Positive | None = None
@@ -159,3 +164,7 @@ class CameraDefects(Section):
     reads_back: Literal["set", "taken"] = "set"
     hot_pixels: list[HotPixel] = Field(default_factory=list)
     limited_range: Literal["none", "declared", "undeclared"] = "none"
+    gamma: Annotated[float, Field(ge=0.2, le=5)] = 1.0
+    nonlinearity: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
+    prnu: Annotated[float, Field(ge=0, le=0.2)] = 0.0
+    dsnu_electrons: NotNegative = 0.0

@@ -1,14 +1,22 @@
-"""Defects of a camera: exposures other than those that were set, hot pixels, limited range."""
+"""Defects of a camera: false exposures, hot and unequal pixels, response curve, limited range."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from instrument.config.camera import LIMITED_BLACK_DN, LIMITED_WHITE_DN, CameraDefects
+from instrument.config.camera import (
+    LIMITED_BLACK_DN,
+    LIMITED_WHITE_DN,
+    CameraConfig,
+    CameraDefects,
+)
 from instrument.devices import Image
 from instrument.geometry import FloatArray
 
 _FULL_DN = 255  # white of the full range
+
+FloatImage = NDArray[np.float32]
 
 
 def true_exposure_s(set_s: float, defects: CameraDefects) -> float:
@@ -36,6 +44,42 @@ def hot_electrons_per_s(shape: tuple[int, int], defects: CameraDefects) -> Float
     for pixel in defects.hot_pixels:
         current[pixel.row, pixel.column] += pixel.electrons_per_s
     return current
+
+
+def unequal_responses(
+    shape: tuple[int, int], defects: CameraDefects, random: np.random.Generator
+) -> FloatImage | None:
+    """Return the relative response to light of each pixel (rows, columns); None if all equal."""
+    if not defects.prnu:
+        return None
+    return (1 + defects.prnu * random.standard_normal(shape)).astype(np.float32)
+
+
+def unequal_darks_electrons(
+    shape: tuple[int, int], defects: CameraDefects, random: np.random.Generator
+) -> FloatImage | None:
+    """Return the excess dark signal in electrons (rows, columns); None if all pixels are equal."""
+    if not defects.dsnu_electrons:
+        return None
+    return (defects.dsnu_electrons * random.standard_normal(shape)).astype(np.float32)
+
+
+def is_bent(defects: CameraDefects) -> bool:
+    """Return True if counts are not proportional to the light."""
+    return defects.gamma != 1.0 or defects.nonlinearity != 0.0
+
+
+def bent(counts: FloatImage, camera: CameraConfig, defects: CameraDefects) -> FloatImage:
+    """Return a picture (rows, columns), in DN before rounding, after the camera's response curve.
+
+    Nothing is below black after a gamma, as in a camera that computes it.
+    """
+    black, span = np.float32(camera.black_level_dn), np.float32(camera.max_dn)
+    share = (counts - black) / (span - black)
+    if defects.gamma != 1.0:
+        share = np.maximum(share, 0) ** np.float32(1 / defects.gamma)
+    share += np.float32(defects.nonlinearity) * share * (1 - share)
+    return black + (span - black) * share
 
 
 def limit_range(image: Image, defects: CameraDefects) -> Image:

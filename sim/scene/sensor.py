@@ -7,7 +7,13 @@ import numpy as np
 
 from instrument.config.camera import CameraConfig
 from instrument.devices import Image
-from sim.defects.camera import hot_electrons_per_s
+from sim.defects.camera import (
+    bent,
+    hot_electrons_per_s,
+    is_bent,
+    unequal_darks_electrons,
+    unequal_responses,
+)
 from sim.defects.picture import distorted, mixed_up, stray_electrons_per_s
 from sim.defects.world import SOUND
 from sim.scene.render import FloatImage, electrons_per_s
@@ -34,7 +40,11 @@ class Sensor:
         self._series: tuple[int, ...] = ()
         self._frame_number = 0
         shape = (self._settings.height_px, self._settings.width_px)
-        self._hot = hot_electrons_per_s(shape, scene.rig.simulation.camera_defects)
+        self._defects = defects = scene.rig.simulation.camera_defects
+        self._hot = hot_electrons_per_s(shape, defects)
+        prnu, dsnu = (scene.random(stream_key(name)) for name in ("PRNU", "DSNU"))
+        self._responses = unequal_responses(shape, defects, prnu)
+        self._darks_electrons = unequal_darks_electrons(shape, defects, dsnu)
         self._light_state: _SceneState = ()
         self._light = self._no_light = np.zeros(shape, np.float32)
         self._expected_key: tuple[_SceneState, float, float] = ((), 0.0, 0.0)
@@ -55,6 +65,9 @@ class Sensor:
         np.multiply(noise, spread, out=noise)
         if world.noise != 1.0:
             noise *= np.float32(world.noise)
+        if is_bent(self._defects):
+            mean = bent(noise + mean, settings, self._defects)
+            noise[:] = 0
         cv2.add(noise, mean, dst=self._counts, dtype=cv2.CV_16U)  # rounds, and saturates at 0
         counts = np.minimum(self._counts, settings.max_dn)
         image: Image = counts.astype(np.uint8) if settings.bit_depth == 8 else counts
@@ -87,6 +100,8 @@ class Sensor:
     ) -> tuple[FloatImage, FloatImage]:
         s = self._settings
         electrons = light * np.float32(level * exposure_s)
+        if self._responses is not None:
+            electrons *= self._responses
         electrons += np.float32(s.dark_current_electrons_per_s * exposure_s)
         if self.scene.world is not SOUND:
             white = self.scene.rig.lamp.white_electrons_per_s
@@ -96,6 +111,8 @@ class Sensor:
             electrons += (self._hot * exposure_s).astype(np.float32)
         np.minimum(electrons, np.float32(s.full_well_electrons), out=electrons)
         spread = np.sqrt(electrons + np.float32(s.read_noise_electrons**2))
+        if self._darks_electrons is not None:
+            electrons += self._darks_electrons
         world = self.scene.world
         gain = np.float32(world.gain * world.amplifier / s.electrons_per_dn)
         spread *= gain

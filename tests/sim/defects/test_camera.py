@@ -1,4 +1,4 @@
-"""Defects of a camera: true exposures, hot pixels and limited range."""
+"""Defects of a camera: true exposures, hot and unequal pixels, response curve, limited range."""
 
 from __future__ import annotations
 
@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 
 from instrument.config.camera import CameraDefects
 from sim.clock import SimulatedClock
-from sim.defects.camera import hot_electrons_per_s, limit_range, read_back_s, true_exposure_s
+from sim.defects.camera import (
+    bent,
+    hot_electrons_per_s,
+    limit_range,
+    read_back_s,
+    true_exposure_s,
+)
 from sim.scene.camera import SimulatedCamera
 from tests.support.scans import changed, simulated_scene, small_scan
 
@@ -62,3 +68,53 @@ def test_a_hot_pixel_of_the_simulated_camera() -> None:
     assert extra == pytest.approx(10_000 / small.rig.camera.electrons_per_dn, rel=0.05)
     assert np.sum(image > np.median(image) + 100) == 1
     assert hot_electrons_per_s((8, 8), CameraDefects()) is None
+
+
+def pictures(defects: dict[str, Any], count: int = 24, *, lit: bool = True) -> Any:
+    """Mean picture of a small camera with defects, above black, in electrons at full scale."""
+    small = small_scan()
+    own = CameraDefects.model_validate(defects)
+    simulation = small.rig.simulation.model_copy(update={"camera_defects": own})
+    scene = simulated_scene(changed(small, rig={"simulation": simulation}))
+    scene.lit = lit
+    camera = SimulatedCamera(scene, SimulatedClock())
+    camera.set_exposure_s(0.03)
+    settings = small.rig.camera
+    mean = np.mean([frame.image for frame in camera.grab(count)], axis=0)
+    return (mean - settings.black_level_dn) * settings.electrons_per_dn
+
+
+@pytest.mark.parametrize(
+    ("defects", "curve"),
+    [
+        ({"gamma": 2.2}, lambda share: share ** (1 / 2.2)),
+        ({"nonlinearity": 0.01}, lambda share: share * (1 + 0.01 * (1 - share))),
+    ],
+)
+def test_the_response_curve_of_the_simulated_camera(defects: dict[str, Any], curve: Any) -> None:
+    well = small_scan().rig.camera.full_well_electrons
+    light, seen = pictures({}) / well, pictures(defects) / well
+    bright = light > 0.2
+    assert bright.sum() > 500
+    assert seen[bright] == pytest.approx(curve(light[bright]), rel=0.01)
+    assert np.mean(seen[bright] / curve(light[bright])) == pytest.approx(1.0, abs=2e-4)
+
+
+def test_a_curve_leaves_black_and_full_scale_in_their_place() -> None:
+    camera = small_scan().rig.camera
+    ends = np.array([[camera.black_level_dn, camera.max_dn]], dtype=np.float32)
+    for defects in ({"gamma": 2.2}, {"nonlinearity": -0.3}, {"gamma": 0.5, "nonlinearity": 0.1}):
+        own = CameraDefects.model_validate(defects)
+        assert bent(ends, camera, own) == pytest.approx(ends, rel=1e-6)
+
+
+def test_unequal_pixels_of_the_simulated_camera() -> None:
+    """The same pixels in each frame; responses scale the light and not the dark."""
+    even = pictures({})
+    bright = even > 0.2 * even.max()
+    ratio = (pictures({"prnu": 0.05}) / even)[bright]
+    assert np.std(ratio) == pytest.approx(0.05, rel=0.1)
+    assert np.mean(ratio) == pytest.approx(1.0, abs=0.01)
+    dark = pictures({"dsnu_electrons": 30.0}, lit=False)
+    assert np.std(dark) == pytest.approx(30.0, rel=0.1)
+    assert np.std(pictures({"prnu": 0.05}, lit=False)) < 4.0
