@@ -19,8 +19,7 @@ LEAST_SIGNAL_U = 5.0
 
 def is_dark(reading: Reading) -> bool:
     """Return True for a signal that may be none; an unknown one is flagged for another reason."""
-    u = math.hypot(reading.u_noise_dn, reading.u_quantisation_dn, reading.u_dark_dn)
-    return reading.signal_dn <= LEAST_SIGNAL_U * u
+    return reading.signal_dn <= LEAST_SIGNAL_U * reading.u_light_dn
 
 
 def unlit_steps(readings: Iterable[Reading]) -> frozenset[int]:

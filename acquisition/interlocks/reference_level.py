@@ -40,10 +40,10 @@ def level_doubt(reading: Reading, rig: Rig) -> str:
     if is_misplaced(reading):
         return ""
     name = f"{reading.surface} at theta_i {reading.theta_i_deg:g} deg"
-    if not reading.signal_dn > MIN_SIGNAL_U * reading.u_noise_dn:
+    if not reading.signal_dn > MIN_SIGNAL_U * reading.u_light_dn:
         return (
-            f"{name}: {reading.signal_dn:.3g} DN; expected: {MIN_SIGNAL_U:g} times its noise of "
-            f"{reading.u_noise_dn:.2g} DN or more"
+            f"{name}: {reading.signal_dn:.3g} DN; expected: {MIN_SIGNAL_U:g} times its u of "
+            f"{reading.u_light_dn:.2g} DN (noise, rounding, dark) or more"
         )
     cosine = math.cos(math.radians(reading.theta_i_deg))
     white_per_s = rig.lamp.white_electrons_per_s * cosine / rig.camera.electrons_per_dn

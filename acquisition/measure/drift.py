@@ -12,7 +12,7 @@ from acquisition.measure.radiometry import FEW_PIXELS, LEAVES_FRAME
 from instrument.geometry import FloatArray, IntArray
 from instrument.record.reading import Check, Reading
 
-MIN_SIGNAL_U = 10.0  # with less signal, in u, a check shows noise and not the lamp
+MIN_SIGNAL_U = 10.0  # with less signal, in u, a check shows no light of the lamp
 JUMP_U, MIN_JUMP = 4.0, 0.003  # a jump exceeds both: in u, and relative
 # Changes of a lamp that warms up, before two checks show a trend: at once, per s, and at most
 # (assumed).
@@ -217,8 +217,8 @@ def u_unknown_trend(apart_s: float) -> float:
 
 
 def is_usable(check: Reading) -> bool:
-    """Return True if a drift check has no flags and a signal far above its noise."""
-    return not check.flags and check.signal_dn > max(MIN_SIGNAL_U * check.u_noise_dn, 0.0)
+    """Return True if a drift check has no flags and a signal far above its uncertainty."""
+    return not check.flags and check.signal_dn > max(MIN_SIGNAL_U * check.u_light_dn, 0.0)
 
 
 def is_misplaced(reading: Reading) -> bool:

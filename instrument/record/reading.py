@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -51,6 +52,14 @@ class Reading:
     free_s: float
     time_utc: str
     flags: str
+
+    @property
+    def u_light_dn(self) -> float:
+        """Standard uncertainty of the light at this place: of noise, rounding and the dark, in DN.
+
+        Several exposures of a quiet 8-bit sensor have the same rounding: noise alone says little.
+        """
+        return math.hypot(self.u_noise_dn, self.u_quantisation_dn, self.u_dark_dn)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
