@@ -6,13 +6,17 @@ BIN := $(VENV)/bin
 # Six workers need not each read the files that have no such test.
 WAITING = $(shell grep -rl --include='test_*.py' 'pytest\.mark\.waits' tests)
 
-.PHONY: demo test hil-emulated lint clean
+.PHONY: demo test hil-emulated lint waiting clean
 
 demo: $(VENV)/.installed
 	$(BIN)/gonio run configs/protocols/demo.yaml
 
-test: $(VENV)/.installed-dev lint
+# Tests that wait for emulated devices leave the processor to the linters.
+test: $(VENV)/.installed-dev
+	$(MAKE) --no-print-directory -j 2 --output-sync=target lint waiting
 	$(BIN)/pytest -n auto --dist worksteal -m "not hil and not waits"
+
+waiting: $(VENV)/.installed-dev
 	$(BIN)/pytest -n 6 -m "waits and not hil" $(WAITING)
 
 # The tests for a bench, in an emulated computer with real kernel drivers; OPTIONS="--slow" runs all.

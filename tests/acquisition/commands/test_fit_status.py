@@ -21,22 +21,28 @@ COMPLETE = "the run is complete: all readings are recorded and reported"
 class Case(NamedTuple):
     """Changes of the protocol's text, and what a fit of its run ends with.
 
-    model: the only candidate; empty for the automatic choice.
+    models: the candidates; empty for the automatic choice.
     """
 
     changes: Mapping[str, str]
     code: int
     verdict: str | None
     words: str = ""
-    model: str = ""
+    models: str = ""
 
 
 WITH_TILE = "  white_tile: {reflectance: 0.99, u_reflectance: 0.005, theta_r_deg: 10.0}\n"
 DRIFT_CHECK = "  drift_check: {theta_r_deg: 10.0, every_points: 25}\n"
 CASES = {
-    "adequate": Case({}, 0, "adequate"),
-    "no candidate is adequate": Case({}, 0, "none adequate", model="lambert"),
-    "no white tile": Case({WITH_TILE: ""}, 5, "not identifiable", "do not determine albedo"),
+    "adequate": Case({}, 0, "adequate", models="lambert,oren_nayar+torrance_sparrow"),
+    "no candidate is adequate": Case({}, 0, "none adequate", models="lambert"),
+    "no white tile": Case(
+        {WITH_TILE: ""},
+        5,
+        "not identifiable",
+        "do not determine albedo",
+        "lambert,oren_nayar+torrance_sparrow",
+    ),
     "too few points": Case(
         {
             "[30.0, 60.0]": "[30.0]",
@@ -69,12 +75,12 @@ def test_four_commands_end_with_the_same_code_and_verdict(case: Case, tmp_path: 
     for old, new in case.changes.items():
         assert old in text
         text = text.replace(old, new)
-    protocol.write_text(text + (f"fit: {{models: [{case.model}]}}\n" if case.model else ""))
+    protocol.write_text(text + (f"fit: {{models: [{case.models}]}}\n" if case.models else ""))
     commands = (
         ("run", protocol, "--out", run),
         ("resume", run),
         ("report", run),
-        ("fit", run, *(("--models", case.model) if case.model else ())),
+        ("fit", run, *(("--models", case.models) if case.models else ())),
     )
     for command in commands:
         done = gonio(*command, "--json")
