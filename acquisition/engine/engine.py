@@ -79,7 +79,7 @@ class Engine:
         self._record, self._on_step = record, on_step
         self._pinhole = Pinhole.of(rig)
         self._ended = False
-        self._references = References(rig)
+        self._references = References(rig, protocol.references.white_tile)
         note = partial(self._add_event, OPERATOR)
         self._positioner = Positioner(rig, devices.axes, devices.lamp, devices.operator, note)
         self._scatter = FrameScatter(rig, partial(self._add_event, INTERLOCK))

@@ -20,16 +20,20 @@ from acquisition.measure.drift import (
 )
 from acquisition.measure.placement import Placement
 from instrument.config.axes import HandAxis
+from instrument.config.protocol import WhiteTile
 from instrument.config.rig import Rig
 from instrument.record.reading import Reading
 
 MOST_WHITE = 10.0
 """Times the rig file's prediction for a perfect white diffuser: it is an estimate."""
 LAMP_OFF_DEG = 2.0
-"""Lamp angle by which readings of the tile may differ from the cosine law beyond 5 u.
+"""Lamp angle by which readings of the tile may differ from the expected law beyond 5 u."""
+_FALLOFF = 0.08
+"""Fall of a tile's radiance factor with 1 - cos(theta_i), where no table states it.
 
-It stands for the tile as well: pressed PTFE reflects some 5 % less than a perfect diffuser at
-theta_i = 60 deg (assumed), as if the lamp stood 1.7 deg further down.
+It lies between a perfect diffuser and sintered PTFE, whose factor falls by 0.2 (1.070 at 0, 0.966
+at 60 deg: T. A. Germer, Applied Optics 56 (2017) 9333): neither is taken for a lamp at a wrong
+angle, and one that is 5 deg off at 60 deg is noticed with either.
 """
 _COVERAGE = 5.0
 _NEXT_SETTING = 0.01  # change of the lamp's output when it is moved by hand (assumed)
@@ -55,15 +59,21 @@ def level_doubt(reading: Reading, rig: Rig) -> str:
     return ""
 
 
-def angle_doubt(tile: Reading, other: Reading, drifts: Mapping[int, Drift], rig: Rig) -> str:
+def angle_doubt(
+    tile: Reading,
+    other: Reading,
+    drifts: Mapping[int, Drift],
+    rig: Rig,
+    white_tile: WhiteTile | None = None,
+) -> str:
     """Return why a reading of the tile contradicts an earlier one, empty if it does not.
 
-    `drifts`: of the lamp, by block.
+    `drifts`: of the lamp, by block. `white_tile`: a table in it is followed.
     """
     if other.flags or not other.signal_dn > 0:
         return ""
     own = [drifts[r.block] for r in (tile, other)]
-    found, expected = _ratio(tile, other, own), _cosine(tile) / _cosine(other)
+    found, expected = _ratio(tile, other, own), _light(tile, white_tile) / _light(other, white_tile)
     allowed = math.hypot(_allowed(tile, rig), _allowed(other, rig))
     allowed += _lamp_change(tile, other, own)
     if abs(math.log(found / expected)) <= allowed:
@@ -113,8 +123,13 @@ def _ratio(tile: Reading, other: Reading, drifts: Sequence[Drift]) -> float:
     return rates[0] / rates[1]
 
 
-def _cosine(reading: Reading) -> float:
-    return math.cos(math.radians(reading.theta_i_deg))
+def _light(reading: Reading, white_tile: WhiteTile | None) -> float:
+    """Return the light of the tile by the cosine law and its table, relative to a perfect white."""
+    values = None if white_tile is None else white_tile.values
+    cosine = math.cos(math.radians(reading.theta_i_deg))
+    if values is None:
+        return cosine * (1 - _FALLOFF * (1 - cosine))
+    return cosine * values.at(reading.theta_i_deg, reading.theta_r_deg, reading.dphi_deg).beta
 
 
 def _allowed(tile: Reading, rig: Rig) -> float:

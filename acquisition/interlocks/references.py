@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from acquisition.interlocks.lamp_checks import check_text, compared, failed, stopped_check
 from acquisition.interlocks.reference_level import angle_doubt, level_doubt, repeat_doubt
 from acquisition.measure.drift import Drift, rate
+from instrument.config.protocol import WhiteTile
 from instrument.config.rig import Rig
 from instrument.record.reading import Check, Reading
 
@@ -26,6 +27,7 @@ class References:
     """Tile readings and drift checks that a scan has accepted, and the checks at each resume."""
 
     rig: Rig
+    white_tile: WhiteTile | None = None
     readings: list[Reading] = field(default_factory=list)
     checks: list[Check] = field(default_factory=list)
     _unbroken: set[int] = field(default_factory=set)  # steps since the program was started
@@ -87,7 +89,7 @@ class References:
             if other.lamp_setting == reading.lamp_setting:
                 text = repeat_doubt(reading, other, drifts[reading.block], self.rig)
             else:
-                text = angle_doubt(reading, other, drifts, self.rig)
+                text = angle_doubt(reading, other, drifts, self.rig, self.white_tile)
             if text:
                 return other, text
         return None, ""

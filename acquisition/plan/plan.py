@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from acquisition.plan.exposure_ladder import expected_exposure_s, exposure_ladder_s
 from acquisition.plan.moves import Move, NoPathError, moves_between
 from acquisition.plan.pose import Pose, home_pose
+from acquisition.plan.tile_table import outside_table
 from instrument.config.axes import AXES, HandAxis
 from instrument.config.load import Loaded
 from instrument.config.protocol import Protocol, SweepConfig, angles_deg
@@ -91,7 +92,12 @@ def make_plan(loaded: Loaded) -> Plan:
         )
     steps = _with_previews(_ordered_steps(visible, protocol, rig))
     steps, blocked = _with_moves(steps, loaded)
-    problems = [*_hidden_references(steps, limit_deg, loaded), *blocked]
+    tiles = [step.pose for step in steps if step.kind == "tile"]
+    problems = [
+        *_hidden_references(steps, limit_deg, loaded),
+        *outside_table(tiles, loaded),
+        *blocked,
+    ]
     if problems:
         raise InputError(*problems)
     return _schedule(steps, hidden, loaded)

@@ -2,8 +2,9 @@
 
 radiance: counts per second, corrected for lamp drift. It is relative: the rig has no absolute
 calibration. BRDF: radiance of the sample over that of the white tile at the same lamp setting,
-times the tile's reflectance / pi. The tile is assumed to be Lambertian (Nicodemus et al. 1977,
-section 3). Use `reduced_run` for a record, and `reduce` for readings in memory.
+times the tile's radiance factor / pi at the angles of its reading (Nicodemus et al. 1977, section
+3; `acquisition.measure.white_tile`). Use `reduced_run` for a record, and `reduce` for readings in
+memory.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from acquisition.interlocks.lamp_checks import UNPROVEN, doubtful_steps
 from acquisition.interlocks.no_light import NO_SIGNAL, unlit_steps
 from acquisition.measure.drift import Drift, rate
 from acquisition.measure.placement import tilt_deg
+from acquisition.measure.white_tile import Standard, standard
 from analysis.data.measurements import SharedError
 from instrument.config.load import Loaded
 from instrument.config.protocol import Protocol
@@ -162,8 +164,8 @@ def reduce(
         if r.kind == "tile"  # the first of each setting; one at its end only confirms it
     }
     radiance = np.array([rate(p) / drifts[p.block].at(p.time_s) for p in points])
-    tile = protocol.references.white_tile
-    known = tile.reflectance / np.pi if tile is not None else np.nan
+    tile = standard_of(points, protocol)
+    known = tile.beta / np.pi if tile is not None else np.nan
     own = [tiles.get(p.lamp_setting) for p in points]
     white = np.array([np.nan if t is None else t.rate or np.nan for t in own])
     return Reduced(
@@ -176,7 +178,7 @@ def reduce(
             *_drift_noise(points, drifts),
             *_drift_between(points, drifts),
         ),
-        shared_by_tile=_shared_by_tile(points, own, protocol),
+        shared_by_tile=_shared_by_tile(points, own, tile),
         flags=tuple(
             _flags(p, t, tile is not None, doubts) for p, t in zip(points, own, strict=True)
         ),
@@ -194,6 +196,15 @@ def shared_errors(reduced: Reduced, rig: Rig) -> tuple[SharedError, ...]:
         replace(error, theta_i_deg=by_i, theta_r_deg=by_r) if error.name == PLACEMENT else error
         for error in (*reduced.shared, *reduced.shared_by_tile)
     )
+
+
+def standard_of(points: Sequence[Reading], protocol: Protocol) -> Standard | None:
+    """Return the white tile's radiance factor for each point; None without a tile."""
+    tile = protocol.references.white_tile
+    if tile is None:
+        return None
+    theta_i, dphi = (np.array([getattr(p, n) for p in points]) for n in ("theta_i_deg", "dphi_deg"))
+    return standard(tile, theta_i, dphi)
 
 
 def _relative(points: Sequence[Reading], name: str) -> FloatArray:
@@ -283,13 +294,12 @@ def _drift_between(
 
 
 def _shared_by_tile(
-    points: Sequence[Reading], tiles: Sequence[_Tile | None], protocol: Protocol
+    points: Sequence[Reading], tiles: Sequence[_Tile | None], tile: Standard | None
 ) -> tuple[SharedError, ...]:
     """Errors of the tile: its readings, its placements, and its certificate.
 
     One reading serves all points of a lamp setting, and one placement several readings.
     """
-    tile = protocol.references.white_tile
     if tile is None:
         return ()
     settings = np.array([p.lamp_setting for p in points], dtype=np.int64)
@@ -298,11 +308,10 @@ def _shared_by_tile(
         for name in ("u_own", "u_placement")
     )
     placed = np.array([-1 if t is None else t.placement for t in tiles], dtype=np.int64)
-    u_certificate = tile.u_reflectance / tile.reflectance
     return (
         SharedError(TILE_READING, own, settings),
         SharedError(TILE_PLACEMENT, placement, placed),
-        SharedError.common_to_all(TILE, u_certificate, len(points)),
+        *(SharedError(TILE, u, group) for u, group in tile.errors),
     )
 
 

@@ -12,7 +12,7 @@ from analysis.fit.fit import FitResult
 from analysis.report.data import Candidate, Curve, ReportData
 from instrument.config.axes import AXES
 from instrument.config.load import Loaded
-from instrument.config.protocol import Metadata
+from instrument.config.protocol import Metadata, WhiteTile
 from instrument.config.rig import Rig
 from instrument.geometry import FloatArray, Geometry
 from instrument.record.record import Record
@@ -54,7 +54,7 @@ def report_data(
         candidates=candidates(fitted),
         budget=budget,
         previews=tuple(record.previews()),
-        rig=_rig_rows(loaded.rig),
+        rig=(*_rig_rows(loaded.rig), *_tile_rows(protocol.references.white_tile)),
         devices=tuple(record.devices().items()),
         metadata=_metadata_rows(protocol.metadata),
         versions=_version_rows(record),
@@ -108,6 +108,15 @@ def _rig_rows(rig: Rig) -> Rows:
         *axes,
         ("sample on the axis", f"u {rig.u_placement_mm:g} mm (k = 1)"),
     )
+
+
+def _tile_rows(tile: WhiteTile | None) -> Rows:
+    if tile is None:
+        return ()
+    if tile.values is not None:
+        return (("white tile", f"{tile.values.beta.size} radiance factors in {tile.table}"),)
+    where = f", certified at {tile.certificate}" if tile.certificate is not None else ""
+    return (("white tile", f"{tile.reflectance:g}, u {tile.u_reflectance:g} (k = 1){where}"),)
 
 
 def _metadata_rows(metadata: Metadata) -> Rows:

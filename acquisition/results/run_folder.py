@@ -1,6 +1,7 @@
-"""Folder of a run: its name, its copies of protocol and rig, and the data that identify the run.
+"""Folder of a run: its name, its copies of its input files, and the data that identify the run.
 
-The record keeps both texts and their SHA-256. The copies are for people and for `load_run_inputs`,
+They are the protocol, the rig, and the table of the white tile if the protocol names one. The
+record keeps the texts and their SHA-256. The copies are for people and for `load_run_inputs`,
 which refuses a copy that was edited: readings before and after the edit would not belong together.
 """
 
@@ -20,8 +21,9 @@ from instrument.errors import InputError, StorageError
 from instrument.record.record import Record
 from instrument.text.atomic_file import write_whole
 
-PROTOCOL_FILE, RIG_FILE = "protocol.yaml", "rig.yaml"
-_FILES = {"protocol": PROTOCOL_FILE, "rig": RIG_FILE}  # by the record's key of the text
+PROTOCOL_FILE, RIG_FILE, TILE_FILE = "protocol.yaml", "rig.yaml", "white_tile.csv"
+# By the record's key of the text; there is one of the white tile only where the protocol names it.
+_FILES = {"protocol": PROTOCOL_FILE, "rig": RIG_FILE, "white_tile": TILE_FILE}
 
 
 def default_folder(loaded: Loaded) -> Path:
@@ -46,12 +48,19 @@ def run_meta(loaded: Loaded, plan: Plan) -> dict[str, str]:
         "planned_s": f"{plan.duration_s:.1f}",
         "hidden": str(len(plan.hidden)),
         "steps": str(len(plan.steps)),
+        **_tile_meta(loaded),
         **loaded.protocol.metadata.given(),
     }
 
 
+def _tile_meta(loaded: Loaded) -> dict[str, str]:
+    """Return the table of the white tile; nothing without one."""
+    text = loaded.tile_text
+    return {} if text is None else {"white_tile": text, "white_tile_sha256": _digest(text)}
+
+
 def write_run_inputs(record: Record) -> None:
-    """Write the run's copies of protocol and rig where they are missing.
+    """Write the run's copies of its input files where they are missing.
 
     A process that was killed early may have left a record without them. Raises `StorageError`.
     """
@@ -66,12 +75,20 @@ def write_run_inputs(record: Record) -> None:
 
 
 def load_run_inputs(record: Record) -> Loaded:
-    """Load the run's copies of protocol and rig; raises `InputError` if one was changed."""
+    """Load the run's copies of its input files; raises `InputError` if one was changed."""
     folder = record.folder
-    loaded = load_protocol(folder / PROTOCOL_FILE, folder / RIG_FILE, check_model=check_model)
-    texts = {"protocol": loaded.protocol_text, "rig": loaded.rig_text}
+    loaded = load_protocol(
+        folder / PROTOCOL_FILE,
+        folder / RIG_FILE,
+        check_model=check_model,
+        tile_path=folder / TILE_FILE,
+    )
+    texts = {
+        "protocol": loaded.protocol_text, "rig": loaded.rig_text, "white_tile": loaded.tile_text
+    }  # fmt: skip
     for key, name in _FILES.items():
-        if record.meta(f"{key}_sha256") != _digest(texts[key]):
+        text = texts[key]
+        if record.meta(f"{key}_sha256") != (None if text is None else _digest(text)):
             raise InputError(
                 f"{folder / name}: changed since the run began, so its readings would not belong "
                 "together: restore the file, or start a new run"

@@ -6,7 +6,7 @@ import numpy as np
 
 from acquisition.results.damage import damage_text
 from acquisition.results.fitting import Fitted, u_without
-from acquisition.results.reduction import DARK, NOISE, ROUNDING, Reduced
+from acquisition.results.reduction import DARK, NOISE, ROUNDING, Reduced, standard_of
 from analysis.choice.notes import NoteCode
 from analysis.fit.fit import FitResult
 from analysis.report.data import Parameter
@@ -118,7 +118,7 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         _pull_note(fitted),
         _bits_note(reduced, fitted, loaded),
         _exposure_note(reduced, record),
-        "the white tile is assumed to be Lambertian" if reduced.shared_by_tile else "",
+        _tile_note(reduced, loaded),
     )
     return tuple(note for note in found if note)
 
@@ -134,6 +134,35 @@ def _exposure_note(reduced: Reduced, record: Record) -> str:
         f"exposures that no comparison of counts has confirmed (too bright or too dark): "
         f"{', '.join(bare)}"
     )
+
+
+def _tile_note(reduced: Reduced, loaded: Loaded) -> str:
+    """State the radiance factor of the white tile away from its certificate, and its u."""
+    tile = loaded.protocol.references.white_tile
+    found = standard_of(reduced.points, loaded.protocol)
+    if tile is None or found is None:
+        return ""
+    if tile.values is not None:
+        return (
+            f"the white tile's radiance factor is {_span(found.beta)} at the angles of its "
+            "readings, linear between the values of its table"
+        )
+    if tile.certificate is None:
+        return (
+            "the white tile is assumed to be Lambertian; sintered PTFE is not, by some 4 % at 30 "
+            "and 60 deg and 7 % at 0 and 70 deg: state its `certificate` or a `table`"
+        )
+    if not found.departure.any():
+        return f"the white tile's number is used at its certificate's geometry, {tile.certificate}"
+    return (
+        f"the white tile's number is certified at {tile.certificate} and used elsewhere: a u of "
+        f"{_span(100 * found.departure)} % is added; a `table` of its radiance factor has less"
+    )
+
+
+def _span(values: FloatArray) -> str:
+    low, high = f"{np.min(values):.4g}", f"{np.max(values):.4g}"
+    return low if low == high else f"{low} to {high}"
 
 
 def _hidden_note(record: Record) -> str:

@@ -8,11 +8,11 @@ import numpy as np
 
 from analysis.data import csv_columns as columns
 from analysis.data.acceptance import Acceptance
-from analysis.data.csv_columns import Column
 from analysis.data.csv_header import Header
-from analysis.data.csv_line import column_of
 from analysis.data.measurements import SharedError
 from instrument.geometry import FloatArray, IntArray
+from instrument.text.csv_column import Column
+from instrument.text.csv_line import column_of
 from instrument.text.text_file import TextFile
 
 

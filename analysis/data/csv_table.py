@@ -23,12 +23,13 @@ import numpy as np
 
 from analysis.data import csv_columns as columns
 from analysis.data.acceptance import Acceptance
-from analysis.data.csv_columns import ANGLES, BRDF, COLUMNS, U_BRDF, Column
+from analysis.data.csv_columns import ANGLES, BRDF, COLUMNS, U_BRDF
 from analysis.data.csv_header import ROWS, Header, read_header
-from analysis.data.csv_line import QuoteError, column_of, texts_of
 from analysis.data.csv_optional import OptionalColumns
 from analysis.data.measurements import Measurements, setting_numbers
 from instrument.geometry import FloatArray
+from instrument.text.csv_column import Column
+from instrument.text.csv_line import QuoteError, column_of, texts_of
 from instrument.text.text_file import TextFile, input_error, read_text
 
 

@@ -1,4 +1,5 @@
-"""Calibrations as data that a scan may read: the response curve of a camera.
+"""Calibrations as data that a scan may read: response curve of a camera, table of a white tile.
 
-Open `response_curve` first. Procedures that measure a calibration, and fits, stand elsewhere.
+Open `response_curve` or `tile_table` first. Procedures that measure a calibration, and fits, stand
+elsewhere.
 """

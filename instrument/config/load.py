@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from pydantic import ValidationError
 
+from instrument.calibration.tile_file import read_tile_table
 from instrument.config.file_role import wrong_role
 from instrument.config.protocol import Protocol
 from instrument.config.protocol_checks import ModelCheck, own_mistakes, rig_mistakes
@@ -40,6 +41,12 @@ class Loaded:
     rig_path: Path
     rig_text: str
 
+    @property
+    def tile_text(self) -> str | None:
+        """Text of the file that holds the white tile's table; None without a table."""
+        tile = self.protocol.references.white_tile
+        return tile.values.text if tile is not None and tile.values is not None else None
+
 
 def load_rig(path: Path) -> Rig:
     """Read a rig file. Raises `InputError` with every mistake in it."""
@@ -51,9 +58,15 @@ def load_rig(path: Path) -> Rig:
 
 
 def load_protocol(
-    path: Path, rig_path: Path | None = None, *, check_model: ModelCheck | None = None
+    path: Path,
+    rig_path: Path | None = None,
+    *,
+    check_model: ModelCheck | None = None,
+    tile_path: Path | None = None,
 ) -> Loaded:
-    """Read a protocol and its rig; `rig_path` replaces the rig that the protocol names.
+    """Read a protocol, its rig, and the table of its white tile.
+
+    `rig_path` replaces the rig that the protocol names, `tile_path` the table of the tile.
 
     `check_model(name, parameters)` returns what is wrong with a model of the protocol, or None;
     parameters are None if the protocol only names the model. Raises `InputError` with every mistake
@@ -69,6 +82,10 @@ def load_protocol(
         for at, text in rig_mistakes(file.marked, rig_file.marked, rig_file.name):
             file.add(at, text)
     files = [file] if rig_file is None else [file, rig_file]
+    try:
+        protocol = protocol and _with_tile_table(file, protocol, tile_path)
+    except InputError as error:
+        raise InputError(*_report(*files), *error.problems) from None
     if protocol is None or rig is None or rig_file is None or any(f.found for f in files):
         raise InputError(*_report(*files))
     return Loaded(
@@ -111,6 +128,26 @@ def _rig_file(protocol: _File, rig_path: Path | None) -> _File | None:
     except (OSError, ValueError):
         protocol.add(("rig",), f"{named!r}; allowed: the path of a rig file")
     return None
+
+
+def _with_tile_table(file: _File, protocol: Protocol, path: Path | None) -> Protocol:
+    """Return the protocol with the white tile's table; a mistake is added if it cannot be read.
+
+    Raises `InputError` with the mistakes in the table.
+    """
+    tile = protocol.references.white_tile
+    if tile is None or tile.table is None:
+        return protocol
+    path = path or file.path.parent / tile.table
+    try:
+        whole = tile.with_values(read_tile_table(path))
+    except InputError as error:
+        if path.is_file():
+            raise
+        file.add(("references", "white_tile", "table"), error.problems[0])
+        return protocol
+    references = protocol.references.model_copy(update={"white_tile": whole})
+    return protocol.model_copy(update={"references": references})
 
 
 def _report(*files: _File) -> list[str]:

@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, PrivateAttr, Tag
 
+from instrument.calibration.tile_table import TileTable
 from instrument.config.section import Finite, Name, NotNegative, Positive, Section
 from instrument.geometry import FloatArray
 
@@ -125,32 +126,73 @@ class PatchConfig(Section):
 ViewAngle = Annotated[float, Field(ge=-89.5, le=89.5)]
 
 
+Certificate = Literal["lambertian", "8/hemispherical", "0/45", "45/0"]
+TILE_NUMBER = ("reflectance", "u_reflectance")
+
+
 class WhiteTile(Section):
     """Reference diffuser of known reflectance, measured at every position of the lamp.
+
+    Either `reflectance` and `u_reflectance`, one number, or `table`: file of its radiance factor at
+    angles, beside the protocol. `certificate`: geometry of the one number, incidence/view in
+    degrees; away from it the tile departs from the number, and its u grows. Left out, or
+    `lambertian`: the number holds everywhere.
 
     `width_mm` and `height_mm` of a thin rectangular tile: its edges in the picture are compared
     with the pose of the rig. Without them they are not. `again_at_end`: the tile is read once more
     after the points of each setting of the lamp by hand, which must agree; one more swap for each.
     """
 
-    reflectance: Annotated[float, Field(gt=0, le=1)]
-    u_reflectance: NotNegative
+    reflectance: Annotated[float, Field(gt=0, le=2)] | None = None
+    u_reflectance: NotNegative | None = None
+    table: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
+    certificate: Certificate | None = None
     theta_r_deg: ViewAngle = 0.0
     frames: Annotated[int, Field(ge=1, le=10_000)] = 16
     width_mm: SampleSize | None = None
     height_mm: SampleSize | None = None
     again_at_end: bool = False
+    _values: TileTable | None = PrivateAttr(None)
+
+    @property
+    def values(self) -> TileTable | None:
+        """Content of `table`, None where one number is given."""
+        return self._values
+
+    def with_values(self, values: TileTable) -> WhiteTile:
+        """Return a copy that holds the content of its `table`."""
+        tile = self.model_copy()
+        tile._values = values
+        return tile
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """Require both sizes or none, and refuse half the reflectance as u: probably in %."""
+        """Require both sizes or none, and one number or a table."""
         if (self.width_mm is None) != (self.height_mm is None):
             missing = "width_mm" if self.width_mm is None else "height_mm"
             yield missing, "is missing; allowed: width_mm and height_mm, or neither"
-        if self.u_reflectance >= self.reflectance / 2:
+        if self.table is not None:
+            for key in (*TILE_NUMBER, "certificate"):
+                if getattr(self, key) is not None:
+                    yield key, f"{getattr(self, key)} beside a table; allowed: one of the two"
+        elif self.reflectance is None or self.u_reflectance is None:
+            for key in TILE_NUMBER:
+                if getattr(self, key) is None:
+                    yield key, "is missing; allowed: a number, or a table"
+        else:
+            yield from self._wrong_number(self.reflectance, self.u_reflectance)
+
+    def _wrong_number(self, reflectance: float, u: float) -> Iterator[tuple[str, str]]:
+        """Refuse half the reflectance as u: probably in %; and more light than falls on it."""
+        if u >= reflectance / 2:
             yield (
                 "u_reflectance",
-                f"{self.u_reflectance:g}; allowed: less than half of reflectance "
-                f"{self.reflectance:g} (k = 1, absolute and not in %)",
+                f"{u:g}; allowed: less than half of reflectance {reflectance:g} (k = 1, absolute "
+                "and not in %)",
+            )
+        if reflectance > 1 and self.certificate not in ("0/45", "45/0"):
+            yield (
+                "reflectance",
+                f"{reflectance:g}; allowed: at most 1 (0/45 or 45/0: 2)",
             )
 
 

@@ -51,9 +51,24 @@ def rig_mistakes(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -> Mistak
     scene = rig.get(("camera", "driver")) == "simulated" or (
         rig.get(("camera", "device")) == EMULATED
     )
+    if scene:
+        yield from _unknown_tile(protocol, rig, rig_name)
     if scene and protocol.get(("simulated_sample",)) is None:
         text = f"is missing; the rig {rig_name} is simulated and needs a sample to render"
         yield ("simulated_sample",), text
+
+
+def _unknown_tile(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -> Mistakes:
+    """Yield a tile that a scene cannot show: a certificate is not what the tile is."""
+    tile: KeyPath = ("references", "white_tile")
+    number = _valid(_POSITIVE, protocol, *tile, "reflectance")
+    factor = number is not None and number > 1 and protocol.get((*tile, "certificate")) is not None
+    table = protocol.get((*tile, "table")) is not None
+    if rig.get(("simulation", "tile")) is None and (table or factor):
+        yield (
+            (*tile, "table" if table else "reflectance"),
+            f"the rig {rig_name} is simulated; allowed: with simulation: tile in it, the true tile",
+        )
 
 
 def own_mistakes(protocol: MarkedYaml, check_model: ModelCheck | None) -> Mistakes:

@@ -65,11 +65,25 @@ class LampConfig(Section):
             yield "darkened_by", f"{self.darkened_by}; allowed for a manual lamp: hand"
 
 
+class SimulatedTile(Section):
+    """True radiance factor of the white tile on a simulated rig, which the protocol may not know.
+
+    `at_normal` * (1 - `falloff` * ((1 - cos theta_i) + (1 - cos theta_r))
+    + `forward` * sin^2 theta_i sin^2 theta_r (1 - cos dphi) / 2). Sintered PTFE is like 1.057, 0.18
+    and 0.5, within 3 % up to theta_i 75 deg seen at 10 deg.
+    """
+
+    at_normal: Annotated[float, Field(gt=0, le=2)] = 1.0
+    falloff: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    forward: Annotated[float, Field(ge=0, le=5)] = 0.0
+
+
 class Simulation(Section):
     """Hidden properties of a simulated rig: noise seed, lamp drift, position of the sample.
 
     `sample_height_mm`: distance of the sample's surface from the rotation axis, towards the camera.
-    `lamp_drift_per_hour`: relative change of the lamp's output.
+    `lamp_drift_per_hour`: relative change of the lamp's output. `tile`: the white tile; without it,
+    matt, and as reflecting as the protocol says, but for an error of its u.
     """
 
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
@@ -77,6 +91,7 @@ class Simulation(Section):
     lamp_drift_per_hour: Annotated[float, Field(gt=-1, lt=1)] = 0.0
     background_reflectance: Annotated[float, Field(ge=0, le=1)] = 0.02
     camera_defects: CameraDefects = CameraDefects()
+    tile: SimulatedTile | None = None
 
     def outside(self, width_px: int, height_px: int) -> Iterator[str]:
         """Yield the hot pixels that lie outside an image of this size, in words."""

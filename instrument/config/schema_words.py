@@ -57,7 +57,8 @@ class Explanation:
             self._unknown_key(path)
         elif kind == "together":
             for key, text in item["ctx"]["found"]:
-                self._add((*path, key), text)
+                if (*path, key) not in self._marked.refused:  # which is reported as such
+                    self._add((*path, key), text)
         elif kind != "too_short" or not isinstance(item["input"], dict):
             self._wrong_value(path, kind)
         return []

@@ -23,6 +23,7 @@ from instrument.config.rig import Rig
 from instrument.devices import Surface
 from instrument.geometry import Brdf, FloatArray, IntArray, lamp_direction
 from sim.clock import SimulatedClock
+from sim.defects.tile import radiance_factor
 from sim.defects.world import SOUND, World
 
 # Place of an axis before it is first set by hand: no picture counts yet, but a dark may show light.
@@ -138,6 +139,9 @@ class Scene:
                 return adequate_brdf(self.sample.model, self.sample.parameters)
             model, parameters = MODELS[self.sample.model], self.sample.parameters
             return lambda geometry: model.brdf(geometry, **parameters)
+        tile = self.rig.simulation.tile
+        if tile is not None:
+            return lambda geometry: radiance_factor(geometry, tile) / np.pi
         albedo = self.tile_reflectance()
         return lambda geometry: MODELS["lambert"].brdf(geometry, albedo=albedo)
 
@@ -152,8 +156,8 @@ class Scene:
     def tile_reflectance(self) -> float:
         """Return the white tile's true reflectance: the certified one plus a random error."""
         tile = self.white_tile
-        if tile is None:
-            raise ValueError("white tile requested, but the protocol has none")
+        if tile is None or tile.reflectance is None or tile.u_reflectance is None:
+            raise ValueError("the reflectance of a white tile is asked for, but there is none")
         error = tile.u_reflectance * self.random(stream_key("white tile")).standard_normal()
         return float(min(1.0, tile.reflectance + error))
 

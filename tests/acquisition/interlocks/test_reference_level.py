@@ -16,12 +16,13 @@ from acquisition.measure.placement import Placement
 from acquisition.results.reduction import reduce
 from instrument.config.load import Loaded
 from instrument.config.protocol import References
-from instrument.config.rig import Rig
+from instrument.config.rig import Rig, SimulatedTile
 from instrument.errors import Interlock
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 from sim.scene.scene import Scene
 from tests.support.scans import changed, small_scan
+from tests.support.white_tiles import table_text, tabled
 from tests.support.whole_scans.lamp_faults import LampFault
 from tests.support.whole_scans.stopped_scan import scan
 
@@ -95,6 +96,34 @@ def test_a_lamp_set_5_degrees_off_at_60_degrees_is_noticed(
     ]
     drifts = {block: Drift((), np.nan) for block in range(2)}
     assert angle_doubt(made[1], made[0], drifts, rig)
+
+
+# Radiance factor of sintered PTFE, seen 10 deg off the normal on the lamp's side, over its 8 deg/
+# hemispherical reflectance: the fit of Germer, Applied Optics 56 (2017) 9333, at 532 nm.
+PTFE = {0.0: 1.0696, 15.0: 1.0642, 30.0: 1.0425, 45.0: 1.0103, 60.0: 0.9656, 70.0: 0.9161}
+
+
+@pytest.mark.parametrize("rig_name", RIGS)
+@pytest.mark.parametrize("blocks", [0, 1])
+def test_sintered_ptfe_is_not_taken_for_a_wrong_angle(rig_name: str, blocks: int) -> None:
+    rig, drifts = rig_of(rig_name), {block: Drift((), np.nan) for block in range(6)}
+    made = [tile(rig_name, a, beta, n * blocks) for n, (a, beta) in enumerate(PTFE.items())]
+    for n, reading in enumerate(made):
+        assert not [t for other in made[:n] if (t := angle_doubt(reading, other, drifts, rig))]
+
+
+def test_a_tile_follows_its_table_where_it_has_one(tmp_path: Path) -> None:
+    """A tile that is far from white: only its table tells that the lamp stands right."""
+    rig, drifts = rig_of("bench_12bit"), {0: Drift((), np.nan)}
+    falling = SimulatedTile(falloff=0.5)
+    known = tabled(table_text(falling, 0.0, 0.001), tmp_path)
+    assert known.values is not None
+    seen = [tile("bench_12bit", a, known.values.at(a, 10.0, 0.0).beta) for a in (30.0, 60.0)]
+    assert angle_doubt(*seen, drifts, rig)
+    assert not angle_doubt(*seen, drifts, rig, known)
+    white = [tile("bench_12bit", angle, 1.0) for angle in (30.0, 60.0)]
+    assert angle_doubt(*white, drifts, rig, known)
+    assert not angle_doubt(*white, drifts, rig)
 
 
 @pytest.mark.parametrize("wrong_deg", [30.0, 60.0])

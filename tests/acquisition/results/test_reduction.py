@@ -8,11 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.results.reduction import DRIFT, TILE_PLACEMENT, reduce
+from acquisition.results.reduction import DRIFT, TILE_PLACEMENT, reduce, root_sum_square
+from analysis.models import MODELS
 from instrument.config.load import Loaded
+from instrument.config.protocol import WhiteTile
+from instrument.config.rig import SimulatedTile
+from instrument.geometry import Geometry
 from instrument.record.reading import Check, Reading
 from instrument.record.record import Record
 from tests.support.scans import changed, small_scan
+from tests.support.white_tiles import SPECTRALON, table_text, tabled, with_tile
 from tests.support.whole_scans.stopped_scan import scan
 
 
@@ -124,3 +129,71 @@ def test_one_placement_of_the_tile_shifts_all_values_that_it_serves(
     assert np.all(stated[0].u_relative != 0)
     setting = [p.lamp_setting for p in found.points]  # by hand, and the tile is placed for each
     assert np.unique(np.column_stack([stated[0].group, setting]), axis=0).shape[0] == 2
+
+
+@pytest.fixture(scope="module")
+def seen_with_ptfe(full: Loaded, tmp_path_factory: pytest.TempPathFactory) -> list[Reading]:
+    """Readings of a scan whose tile is like sintered PTFE, which no certificate has told."""
+    tile, sample = full.protocol.references.white_tile, full.protocol.simulated_sample
+    assert tile is not None
+    assert sample is not None
+    even = changed(full, simulated_sample=sample.model_copy(update={"mottling": 0.0}))
+    with Record.create(tmp_path_factory.mktemp("ptfe") / "run", {}) as record:
+        scan(with_tile(even, tile, SPECTRALON), record)
+        return record.readings()
+
+
+def _against_the_truth(readings: list[Reading], loaded: Loaded) -> tuple[np.ndarray, np.ndarray]:
+    """Relative error of each BRDF and its stated u, (N,); the angles are but little off."""
+    found, sample = reduce(readings, loaded.protocol, ()), loaded.protocol.simulated_sample
+    assert sample is not None
+    angles = {n: [getattr(p, f"{n}_deg") for p in found.points] for n in ("theta_i", "theta_r")}
+    dphi = [p.dphi_deg for p in found.points]
+    geometry = Geometry.from_degrees(**angles, dphi=dphi)
+    truth = MODELS[sample.model].brdf(geometry, **sample.parameters)
+    u = root_sum_square(list(found.parts.values()))
+    return found.brdf / truth - 1, u
+
+
+def test_a_tile_of_ptfe_biases_by_several_per_cent_with_one_number(
+    full: Loaded, seen_with_ptfe: list[Reading]
+) -> None:
+    """Its hemispherical reflectance is right, 0.984; only a u that grows holds what it is off."""
+    bare = WhiteTile(reflectance=0.984, u_reflectance=0.004, theta_r_deg=10.0)
+    stated = bare.model_copy(update={"certificate": "8/hemispherical"})
+    error, u = _against_the_truth(seen_with_ptfe, with_tile(full, bare))
+    assert np.max(np.abs(error)) > 0.035
+    assert np.max(np.abs(error) / u) > 6
+    error, u = _against_the_truth(seen_with_ptfe, with_tile(full, stated))
+    assert np.max(np.abs(error)) > 0.035
+    assert np.max(np.abs(error) / u) < 2
+
+
+def test_with_a_table_the_values_are_right_within_their_u(
+    full: Loaded, seen_with_ptfe: list[Reading], tmp_path: Path
+) -> None:
+    """Certificates with drawn errors; the rest of u is small beside theirs."""
+    pulls = []
+    for seed in range(40):
+        text = table_text(SPECTRALON, 0.003, 0.004, np.random.default_rng(seed))
+        tile = tabled(text, tmp_path)
+        error, u = _against_the_truth(seen_with_ptfe, with_tile(full, tile))
+        assert np.max(np.abs(error)) < 0.025
+        pulls.append(error / u)
+    assert abs(np.mean(pulls)) < 0.5
+    assert 0.75 < np.sqrt(np.mean(np.square(pulls))) < 1.25
+
+
+def test_a_constant_table_reduces_as_its_number(
+    small: Loaded, resumed: tuple[list[Reading], list[Check]], tmp_path: Path
+) -> None:
+    text = table_text(SimulatedTile(at_normal=0.99), 0.0, 0.005)
+    one = WhiteTile(reflectance=0.99, u_reflectance=0.005, theta_r_deg=10.0)
+    first, second = (
+        reduce(resumed[0], with_tile(small, tile).protocol, resumed[1])
+        for tile in (one, tabled(text, tmp_path))
+    )
+    np.testing.assert_array_equal(first.brdf, second.brdf)
+    assert first.parts.keys() == second.parts.keys()
+    for name, u in first.parts.items():
+        np.testing.assert_array_equal(u, second.parts[name])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,14 +14,17 @@ from acquisition.plan.plan import make_plan
 from acquisition.results.run_folder import (
     PROTOCOL_FILE,
     RIG_FILE,
+    TILE_FILE,
     default_folder,
     load_run_inputs,
     run_meta,
     write_run_inputs,
 )
-from instrument.config.load import Loaded
+from instrument.config.load import Loaded, load_protocol
 from instrument.errors import InputError
 from instrument.record.record import Record
+from tests.support.paths import CONFIGS
+from tests.support.white_tiles import SPECTRALON, table_text
 
 
 @pytest.fixture
@@ -63,3 +67,38 @@ def test_the_record_names_what_the_program_ran_on(demo: Loaded) -> None:
 
 def test_the_default_folder_has_the_protocol_s_name_and_the_time(demo: Loaded) -> None:
     assert re.fullmatch(r"runs/demo-\d{8}-\d{6}", str(default_folder(demo)))
+
+
+@pytest.fixture
+def tabled_run(demo: Loaded, tmp_path: Path) -> Iterator[Record]:
+    """A new run of a protocol that names a table of its white tile."""
+    text, folder = (CONFIGS / "protocols" / "demo.yaml").read_text(), tmp_path / "here"
+    folder.mkdir()
+    (folder / "tile.csv").write_text(table_text(SPECTRALON, 0.003, 0.0))
+    text = text.replace("reflectance: 0.99, u_reflectance: 0.005", "table: tile.csv")
+    (folder / "demo.yaml").write_text(text)
+    rig = demo.rig_text.replace("simulation:\n", "simulation:\n  tile: {at_normal: 1.05}\n")
+    (folder / "rig.yaml").write_text(rig)
+    loaded = load_protocol(folder / "demo.yaml", folder / "rig.yaml")
+    with Record.create(tmp_path / "run", run_meta(loaded, make_plan(loaded))) as record:
+        write_run_inputs(record)
+        shutil.rmtree(folder)
+        yield record
+
+
+def test_a_run_keeps_the_table_of_its_white_tile(tabled_run: Record) -> None:
+    """The file that the protocol named is needed no more, nor is the copy."""
+    for _ in range(2):
+        tile = load_run_inputs(tabled_run).protocol.references.white_tile
+        assert tile is not None
+        assert tile.values is not None
+        assert tile.values.text == table_text(SPECTRALON, 0.003, 0.0)
+        (tabled_run.folder / TILE_FILE).unlink()
+        write_run_inputs(tabled_run)
+
+
+def test_a_changed_copy_of_the_table_is_refused(tabled_run: Record) -> None:
+    path = tabled_run.folder / TILE_FILE
+    path.write_text(path.read_text() + "# a remark\n")
+    with pytest.raises(InputError, match=f"{TILE_FILE}: changed since the run began, .*restore"):
+        load_run_inputs(tabled_run)

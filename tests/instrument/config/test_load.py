@@ -177,3 +177,75 @@ def test_empty_and_odd_files() -> None:
     assert message_of(Path("list.yaml")).startswith("list.yaml:1:1: the file is a list")
     Path("latin.yaml").write_bytes(b"name: caf\xe9\n")
     assert message_of(Path("latin.yaml")).startswith("latin.yaml:1:10: byte 0xe9 is not UTF-8")
+
+
+WITH_TABLE = changed(PROTOCOL, "reflectance: 0.99, u_reflectance: 0.005", "table: tiles/white.csv")
+WITH_TRUE_TILE = RIG + "simulation: {tile: {at_normal: 1.05, falloff: 0.2}}\n"
+
+
+def write_table(beta: str = "1.03") -> Path:
+    path = Path("tiles/white.csv")
+    path.parent.mkdir(exist_ok=True)
+    header = "theta_i_deg,theta_r_deg,dphi_deg,beta,u_beta"
+    path.write_text(f"{header}\n0,10,0,1.05,0.003\n60,10,0,{beta},0.003\n")
+    return path
+
+
+def test_a_white_tile_s_table_is_beside_the_protocol_and_may_be_replaced() -> None:
+    path = write_table()
+    loaded = load(WITH_TABLE, WITH_TRUE_TILE)
+    assert loaded.tile_text == path.read_text()
+    tile = loaded.protocol.references.white_tile
+    assert tile is not None
+    assert tile.values is not None
+    assert tile.values.at(30.0, 10.0, 0.0).beta == pytest.approx(1.04)
+    path.rename("copy.csv")
+    again = load_protocol(Path("protocol.yaml"), tile_path=Path("copy.csv"))
+    assert again.protocol == loaded.protocol
+    assert load().tile_text is None
+
+
+def test_a_missing_table_is_a_mistake_of_the_protocol() -> None:
+    place = "protocol.yaml:12:23: references.white_tile.table"
+    assert problems(WITH_TABLE, WITH_TRUE_TILE) == (
+        f"{place}: tiles/white.csv: no such file; check its name and folder",
+    )
+
+
+def test_mistakes_in_a_table_are_reported_beside_those_of_the_protocol() -> None:
+    write_table(beta="103")
+    wrong = changed(WITH_TABLE, "[lambert, oren_nayar]", "[lambertian]")
+    first, second = problems(wrong, WITH_TRUE_TILE)
+    assert first.startswith("protocol.yaml:15:12: fit.models[0]: 'lambertian' is no model")
+    assert second == "tiles/white.csv:3:9: beta: 103; allowed: 0.001 to 5, not in %"
+
+
+def test_a_table_stands_in_place_of_a_number() -> None:
+    write_table()
+    both = changed(WITH_TABLE, "table: tiles", "reflectance: 0.9, certificate: 0/45, table: tiles")
+    assert problems(both, WITH_TRUE_TILE) == (
+        "protocol.yaml:12:29: references.white_tile.reflectance: 0.9 beside a table; allowed: one "
+        "of the two",
+        "protocol.yaml:12:47: references.white_tile.certificate: 0/45 beside a table; allowed: one "
+        "of the two",
+    )
+
+
+def test_a_simulated_rig_must_know_the_true_tile() -> None:
+    """A certificate says what somebody measured; a scene shows what is there."""
+    write_table()
+    text = "the rig rig.yaml is simulated; allowed: with simulation: tile in it, the true tile"
+    assert problems(WITH_TABLE) == (f"protocol.yaml:12:23: references.white_tile.table: {text}",)
+    one = changed(PROTOCOL, "reflectance: 0.99", "certificate: 0/45, reflectance: 1.01")
+    load(one, WITH_TRUE_TILE)
+    assert [p.endswith(text) for p in problems(one)] == [True]
+
+
+def test_a_reflectance_above_1_is_that_of_a_direction() -> None:
+    above = changed(
+        PROTOCOL, "reflectance: 0.99", "certificate: 8/hemispherical, reflectance: 1.01"
+    )
+    assert problems(above, WITH_TRUE_TILE) == (
+        "protocol.yaml:12:59: references.white_tile.reflectance: 1.01; allowed: at most 1 "
+        "(0/45 or 45/0: 2)",
+    )

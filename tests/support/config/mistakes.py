@@ -81,8 +81,7 @@ PROTOCOL_MISTAKES = {
     "too large": (
         "0.99",
         "1.5",
-        "12:29: references.white_tile.reflectance: 1.5 is too large; allowed: a number,"
-        " greater than 0 and at most 1",
+        "12:29: references.white_tile.reflectance: 1.5; allowed: at most 1 (0/45 or 45/0: 2)",
     ),
     "too small": (
         "width_mm: 50.0",
@@ -108,7 +107,7 @@ PROTOCOL_MISTAKES = {
     "missing key": (
         ", u_reflectance: 0.005",
         "",
-        "12:15: references.white_tile.u_reflectance: is missing; allowed: a number, at least 0",
+        "12:15: references.white_tile.u_reflectance: is missing; allowed: a number, or a table",
     ),
     "missing section": (
         "window: {width_mm: 20.0, height_mm: 20.0}\n",
@@ -126,7 +125,8 @@ PROTOCOL_MISTAKES = {
         "u_reflectance: 0.005",
         "u_reflectence: 0.005",
         "12:35: references.white_tile.u_reflectence: unknown key; did you mean u_reflectance?"
-        " allowed: reflectance, u_reflectance, theta_r_deg, frames, width_mm, height_mm",
+        " allowed: reflectance, u_reflectance, table, certificate, theta_r_deg, frames, width_mm,"
+        " height_mm, again_at_end",
     ),
     "double key": (
         "exposure_target: 0.7",
