@@ -8,6 +8,7 @@ and the row decreases with its y.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,8 +60,8 @@ class Pinhole:
         It maps (x, y, 1) in mm to (column, row, 1) in pixels, times a depth. `theta_r_deg` is
         signed. The camera's position is beam_length_mm * camera_direction.
         """
-        position = self.beam_length_mm * camera_direction(theta_r_deg)
-        plane = np.column_stack([[1.0, 0, 0], [0, 1.0, 0], np.array([0, 0, height_mm]) - position])
+        x, y, z = (self.beam_length_mm * camera_direction(theta_r_deg)).tolist()
+        plane = np.array([[1.0, 0, -x], [0, 1.0, -y], [0, 0, height_mm - z]])
         matrix: FloatArray = self._intrinsic() @ self._orientation(theta_r_deg) @ plane
         return matrix
 
@@ -90,25 +91,20 @@ class Pinhole:
 
     def _orientation(self, theta_r_deg: float) -> FloatArray:
         """Return the rotation from the sample's axes to the camera's (right, down, forward)."""
-        theta_r, roll = np.radians([theta_r_deg, self.roll_deg])
-        look_at_axis = np.array(
-            [
-                [np.cos(theta_r), 0, -np.sin(theta_r)],
-                [0, -1.0, 0],
-                [-np.sin(theta_r), 0, -np.cos(theta_r)],
-            ]
-        )
-        turn = np.array(
-            [[np.cos(roll), -np.sin(roll), 0], [np.sin(roll), np.cos(roll), 0], [0, 0, 1.0]]
-        )
+        theta_r, roll = math.radians(theta_r_deg), math.radians(self.roll_deg)
+        c, s = math.cos(theta_r), math.sin(theta_r)
+        look_at_axis = np.array([[c, 0, -s], [0, -1.0, 0], [-s, 0, -c]])
+        c, s = math.cos(roll), math.sin(roll)
+        turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
         orientation: FloatArray = self._aim() @ turn @ look_at_axis
         return orientation
 
     def _aim(self) -> FloatArray:
         """Return the smallest rotation that takes the axis from the image centre to its pixel."""
-        offset = np.array([self.axis_column_px, self.axis_row_px]) - self._centre_px
-        ray = np.append(offset / self.focal_px, 1.0)
-        x, y, z = ray / np.linalg.norm(ray)
+        column, row = self._centre_px.tolist()
+        x, y = self.axis_column_px - column, self.axis_row_px - row
+        distance = math.hypot(x, y, self.focal_px)
+        x, y, z = x / distance, y / distance, self.focal_px / distance
         return np.array(
             [
                 [1 - x * x / (1 + z), -x * y / (1 + z), x],
