@@ -86,16 +86,25 @@ def _scene(loaded: Loaded) -> Scene:
 class OpenRig(Closeable):
     """Devices of a rig, each opened on request and closed at the end of a `with` block.
 
-    `scene` is what a simulated or emulated rig shows; without one, a white sample.
+    `scene` is what a simulated or emulated rig shows; without one, a white sample, a square with
+    sides of `white_mm`.
     """
 
-    def __init__(self, rig: Rig, scene: Scene | None = None, faults: Faults | None = None) -> None:
+    def __init__(
+        self,
+        rig: Rig,
+        scene: Scene | None = None,
+        faults: Faults | None = None,
+        white_mm: float = 50.0,
+    ) -> None:
         self._rig, self._closing = rig, ExitStack()
         self._faults = (faults or Faults.from_environment()) if rig.simulated else None
-        self._scene = None if rig.real else scene or Scene.of_white_sample(rig)
+        self._scene = None if rig.real else scene or Scene.of_white_sample(rig, white_mm)
         self.clock: Clock = SimulatedClock() if rig.simulated else SystemClock()
         if self._scene is not None:
             self._scene.use_clock(self.clock)
+        if self._faults is not None:
+            self._faults.scene = self._scene
         self.operator = self._operator()
         self.lamp = self._lamp()
 

@@ -9,7 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.calibration.level_series import LevelSeries, flicker, saturation_index, unsaturated
+from analysis.calibration.level_series import (
+    Estimate,
+    LevelSeries,
+    flicker,
+    saturation_index,
+    unsaturated,
+)
 from analysis.calibration.linearity_error import LinearityError, linearity_error
 from analysis.calibration.photon_transfer import (
     PhotonTransfer,
@@ -23,6 +29,12 @@ from instrument.geometry import IntArray
 LEAST_LEVELS = 6  # below saturation: three common parameters, two of a bend, and one to judge them
 _LEAST_TOP = 0.5  # of full scale, reached by the brightest level: a response is not extrapolated
 _LEAST_RISE = 0.2  # of the ratio of exposures, in logarithms: a gamma of 2.2 has 0.45
+_LEAST_VARIANCE_DN2 = 0.02  # of the noisiest level: a well of a million electrons at 8 bit has 0.06
+_LEAST_GAIN = 5.0  # times its u
+_DENOISED = (
+    "Switch off noise reduction and compression, choose a pixel_format of more bits, or take more "
+    "frames (--frames)"
+)
 _LAMP_IN_DARKS = 0.3  # of the rise of lit levels: no dark current comes near it
 
 
@@ -55,12 +67,15 @@ def fit_camera(lit: LevelSeries, dark: LevelSeries, max_dn: float) -> CameraFit:
     fitted = lit.chosen(usable)
     common = (wander**2 + (relative * (fitted.mean_dn - dark_dn)) ** 2) / fitted.frames
     response = fit_response(fitted, np.sqrt(fitted.u_mean_dn() ** 2 + common), max_dn, dark_dn)
+    _require_variance(fitted)
     u_dark = np.sqrt(dark.u_mean_dn() ** 2 + wander**2 / dark.frames)
+    transfer = photon_transfer(lit, dark, response, u_dark)
+    _require_gain(transfer.gain_dn_per_electron)
     dark_at = np.interp(lit.exposure_s, dark.exposure_s, dark.mean_dn)
     top = saturation_index(linear_variance_dn2(lit, response))
     return CameraFit(
         response=response,
-        transfer=photon_transfer(lit, dark, response, u_dark),
+        transfer=transfer,
         linearity=linearity_error(lit, dark_at, top),
         flicker=relative,
         black_wander_dn=wander,
@@ -113,6 +128,22 @@ def _require_levels(lit: LevelSeries, usable: IntArray, max_dn: float, dark_dn: 
             f"camera: the longest exposure without saturation, {lit.exposure_s[usable[-1]]:g} s, "
             f"reaches {100 * top:.3g} % of full scale; needed: {100 * _LEAST_TOP:g} %. More light, "
             "a longer max_exposure_s, or more exposures (--exposures)"
+        )
+
+
+def _require_variance(lit: LevelSeries) -> None:
+    """Refuse levels without noise."""
+    most = float(lit.variance_dn2.max())
+    if most < _LEAST_VARIANCE_DN2:
+        raise NotDetermined(f"camera: its frames have no noise ({most:.2g} DN²). {_DENOISED}")
+
+
+def _require_gain(gain: Estimate) -> None:
+    """Refuse noise that does not rise with the light as photons demand."""
+    if not gain.value > _LEAST_GAIN * gain.u:
+        raise NotDetermined(
+            f"camera: the noise does not rise with the light: gain {gain.value:.2g} ± {gain.u:.2g} "
+            f"DN per electron. {_DENOISED}"
         )
 
 

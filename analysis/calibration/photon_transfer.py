@@ -23,6 +23,7 @@ from analysis.calibration.response_fit import ResponseFit
 from instrument.geometry import BoolArray, FloatArray
 
 _SENSITIVITY = 0.7  # of the saturation: the range of the gain's fit (6.6 of the standard)
+_NOISE = 4.0  # standard deviations that reach from the mean of a cut-off level to its limit
 _ROUNDS = 4  # of the fit, whose weights depend on its result
 LEAST_NOISE_DN2 = 0.24  # below it rounding rules the dark noise (6.6 of the standard)
 
@@ -227,7 +228,10 @@ def _saturation(
     # The largest variance lies between the neighbours of the exposure that has it.
     step = float(exposure_s[last + 1] - exposure_s[max(last - 1, 0)]) / 2 / float(exposure_s[last])
     relative = float(np.hypot(gain.u / gain.value, step / np.sqrt(3)))
-    top = response.light(lit.mean_dn[-1:]) - response.light(np.array([dark_dn]))
+    end = float(lit.mean_dn[-1])
+    if end + _NOISE * float(np.sqrt(lit.variance_dn2[last])) > response.max_dn:
+        end = response.max_dn  # the converter's limit, which cuts off half of the noise
+    top = response.light(np.array([end])) - response.light(np.array([dark_dn]))
     full = float(top[0]) * span / gain.value
     u_full = full * float(np.hypot(gain.u / gain.value, response.u_light_relative))
     return Estimate(reached, reached * relative), Estimate(full, u_full)

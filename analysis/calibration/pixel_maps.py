@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.calibration.level_series import ROUNDING_DN2, Estimate, rounding_of_mean_dn
+from analysis.calibration.response_fit import ResponseFit
 from instrument.geometry import BoolArray, FloatArray
 
 _HIGH_PASS, _FLAT = 5, 15  # side of the squares of neighbours; 5 is that of the standard (8.8)
@@ -74,22 +75,38 @@ def dark_maps(short: Stack, long: Stack) -> DarkMaps:
     )
 
 
-def flat_maps(lit: Stack, dark_dn: FloatArray, measured: BoolArray, hot: BoolArray) -> FlatMaps:
+def made_linear(stack: Stack, response: ResponseFit) -> Stack:
+    """Return a stack, (rows, columns) in DN, on the scale that is linear in light, black at 0."""
+    share = response.share(stack.mean_dn)
+    return Stack(
+        exposure_s=stack.exposure_s,
+        mean_dn=response.curve.light(share) * response.span_dn,
+        variance_dn2=stack.variance_dn2 * response.curve.gradient(share) ** 2,
+        frames=stack.frames,
+    )
+
+
+def flat_maps(
+    lit: Stack, dark_dn: FloatArray, measured: BoolArray, hot: BoolArray, response: ResponseFit
+) -> FlatMaps:
     """Return the flat field from a stack in DN and the dark at its exposure, in DN.
 
     dark_dn, measured, hot: (rows, columns); measured is True where the surface fills the picture.
     """
-    signal = lit.mean_dn - dark_dn
-    used = measured & ~hot
-    level, _ = _local_mean(signal, used, _FLAT)
-    response = np.where(used, signal / np.maximum(level, 1e-9), 1.0)
-    u = np.where(used, lit.u_mean_dn() / np.maximum(level, 1e-9), 0.0)
+    linear, used = made_linear(lit, response), measured & ~hot
+    dark = response.curve.light(response.share(dark_dn)) * response.span_dn
+    signal = linear.mean_dn - dark
+    first, u = _relative(signal, linear, used)
     typical = float(np.median(u[used])) if used.any() else 0.0
-    deviant = used & _above(np.abs(response - 1), typical, response[used] - 1)
-    clean = used & ~deviant
-    level, _ = _local_mean(signal, clean, _FLAT)
-    response = np.where(clean, signal / np.maximum(level, 1e-9), 1.0)
-    return FlatMaps(response=response, u_response=u, measured=used, deviant=deviant)
+    deviant = used & _above(np.abs(first - 1), typical, first[used] - 1)
+    own, u = _relative(signal, linear, used & ~deviant)
+    return FlatMaps(response=own, u_response=u, measured=used, deviant=deviant)
+
+
+def _relative(signal: FloatArray, stack: Stack, used: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Return the signal of each pixel relative to its neighbours, 1 where not used, and its u."""
+    level = np.maximum(local_mean(signal, used, _FLAT)[0], 1e-9)
+    return np.where(used, signal / level, 1.0), np.where(used, stack.u_mean_dn() / level, 0.0)
 
 
 def dsnu(dark: Stack, used: BoolArray, gain_dn_per_electron: float) -> Estimate:
@@ -118,7 +135,7 @@ def _root(variance: Estimate, scale: float) -> Estimate:
 
 def _spatial_variance_dn2(mean_dn: FloatArray, stack: Stack, used: BoolArray) -> Estimate:
     """Return the variance over pixels of a high-passed mean, temporal noise taken off."""
-    around, count = _local_mean(mean_dn, used, _HIGH_PASS)
+    around, count = local_mean(mean_dn, used, _HIGH_PASS)
     counted = used & (count >= _LEAST_NEIGHBOURS)
     rest = (mean_dn - around)[counted] / np.sqrt(1 - 1 / count[counted])
     temporal = float(np.mean(stack.variance_dn2[counted])) / stack.frames
@@ -128,8 +145,11 @@ def _spatial_variance_dn2(mean_dn: FloatArray, stack: Stack, used: BoolArray) ->
     return Estimate(measured - temporal, u)
 
 
-def _local_mean(values: FloatArray, used: BoolArray, side: int) -> tuple[FloatArray, FloatArray]:
-    """Return the mean of the used pixels in a square around each pixel, and their number."""
+def local_mean(values: FloatArray, used: BoolArray, side: int) -> tuple[FloatArray, FloatArray]:
+    """Return the mean of the used pixels in a square around each, in their unit, and their number.
+
+    values, used: (rows, columns). side: of the square, in pixels.
+    """
     import cv2
 
     weights = used.astype(np.float64)

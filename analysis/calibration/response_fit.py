@@ -109,7 +109,8 @@ def fit_response(
     scale = max(1.0, min(chi2 / max(size - k, 1) for _, chi2, k in fits))
     best = min(fits, key=lambda fit: fit[1] / scale + _penalty(fit[2], size))
     # A bend that is too small to be chosen may be there all the same.
-    bent = [fit for fit, _, k in fits if k == best[2] + 1 and not fit.curve.is_video]
+    polynomials = [] if best[0].curve.is_video else fits
+    bent = [f for f, _, k in polynomials if k == best[2] + 1 and not f.curve.is_video]
     u = max(fit.shape_u_relative() for fit in (best[0], *bent))
     return replace(best[0], u_light_relative=u)
 

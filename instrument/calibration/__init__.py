@@ -1,5 +1,5 @@
-"""Calibrations as data that a scan may read: response curve of a camera, table of a white tile.
+"""Calibrations as data that a scan may read: of a camera, and the table of a white tile.
 
-Open `response_curve` or `tile_table` first. Procedures that measure a calibration, and fits, stand
-elsewhere.
+Open `camera_calibration` or `tile_table` first. Procedures that measure a calibration, and fits,
+stand elsewhere.
 """

@@ -47,7 +47,7 @@ D = TypeVar("D", bound=FaultyDevice[Any])
 class Faults:
     """Planned faults of one set of devices; wraps each device so that it can fail.
 
-    `triggers` counts the devices' calls; `scene` is set once the first stage has been wrapped.
+    `triggers` counts the devices' calls; `scene` is set when the rig is opened.
     """
 
     def __init__(self, text: str = "") -> None:

@@ -79,12 +79,12 @@ class Scene:
         return cls(rig, protocol.simulated_sample, protocol.sample, protocol.window, tile)
 
     @classmethod
-    def of_white_sample(cls, rig: Rig) -> Scene:
-        """Return a scene for setting a rig up: a matt white sample, 50 mm by 50 mm."""
+    def of_white_sample(cls, rig: Rig, size_mm: float = 50.0) -> Scene:
+        """Return a scene for setting a rig up: a matt white square with sides of `size_mm`."""
         return cls(
             rig,
             SimulatedSample(model="lambert", parameters={"albedo": 0.9}),
-            Sample(name="white", width_mm=50.0, height_mm=50.0),
+            Sample(name="white", width_mm=size_mm, height_mm=size_mm),
             PatchConfig(width_mm=20.0, height_mm=20.0),
             None,
         )

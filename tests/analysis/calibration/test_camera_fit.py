@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -141,6 +142,17 @@ def levels_of(model: SensorModel, exposures: Array, shown_s: Array | None = None
     taken = exposures if shown_s is None else shown_s
     stacks = [model.stack(e, 2, lit=True) for e in taken]
     return level_series(exposures, stacks)
+
+
+def test_noise_that_does_not_rise_with_the_light_is_refused() -> None:
+    """Frames whose noise is that of the darks, as behind a filter that takes photon noise off."""
+    model = SensorModel()
+    lit, dark = model.levels(20)
+    flat = replace(lit, variance_dn2=np.full(20, float(dark.variance_dn2[0])))
+    with pytest.raises(NotDetermined, match=r"does not rise with the light: gain .* DN per elec"):
+        fit_camera(flat, dark, model.max_dn)
+    with pytest.raises(NotDetermined, match="its frames have no noise"):
+        fit_camera(replace(lit, variance_dn2=np.zeros(20)), dark, model.max_dn)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.calibration.pixel_maps import DarkMaps, Stack, dark_maps, dsnu, flat_maps, prnu
+from analysis.calibration.pixel_maps import (
+    DarkMaps,
+    Stack,
+    dark_maps,
+    dsnu,
+    flat_maps,
+    made_linear,
+    prnu,
+)
+from analysis.calibration.response_fit import ResponseFit
+from instrument.calibration.response_curve import GAMMA, ResponseCurve
 from tests.support.calibration.sensor_model import SensorModel
 
 SHAPE = (90, 110)
@@ -33,6 +43,15 @@ def sensor(*, prnu_: float = 0.008, dsnu_: float = 6.0, bits: int = 12) -> Senso
         bits=bits, shape=SHAPE, factors=factors, darks=dsnu_ * rng.standard_normal(SHAPE),
         hot_per_s=hot, random=rng, black_dn=64.0 if bits > 8 else 8.0,
         read=8.0 if bits > 8 else 60.0,
+    )  # fmt: skip
+
+
+def response_of(model: SensorModel, curve: ResponseCurve) -> ResponseFit:
+    """Known response of the model."""
+    return ResponseFit(
+        curve=curve, max_dn=model.max_dn, black_dn=model.black_dn, rate_per_s=1.0, drift_per_s=0.0,
+        covariance=np.zeros((3, 3)), chi2_per_point=1.0, residual_relative=0.0,
+        u_light_relative=0.0, low_dn=model.black_dn, high_dn=model.max_dn,
     )  # fmt: skip
 
 
@@ -64,12 +83,24 @@ def test_prnu_and_dsnu_are_those_of_the_sensor() -> None:
     model = sensor()
     lit, dark = (stack_of(model, 0.025, 16, lit=lit) for lit in (True, False))
     used = ~darks(model).hot
-    used &= ~flat_maps(lit, dark.mean_dn, used, ~used).deviant
+    used &= ~flat_maps(lit, dark.mean_dn, used, ~used, response_of(model, ResponseCurve())).deviant
     response, offset = prnu(lit, dark, used), dsnu(dark, used, model.gain)
     assert response.value == pytest.approx(0.008, abs=3 * response.u)
     assert offset.value == pytest.approx(6.0, abs=3 * offset.u)
     assert response.u < 2e-4
     assert offset.u < 0.1
+
+
+def test_the_prnu_behind_a_gamma_is_that_of_the_light() -> None:
+    """Counts themselves would show it smaller by the gamma."""
+    model = sensor(dsnu_=0.0)
+    model.curve = lambda share: np.asarray(np.maximum(share, 0) ** (1 / 2.2))
+    gamma = response_of(model, ResponseCurve(GAMMA, (2.2,)))
+    stacks = (stack_of(model, 0.025, 16, lit=lit) for lit in (True, False))
+    lit, dark = (made_linear(stack, gamma) for stack in stacks)
+    used = np.asarray(model.hot_per_s == 0) & (np.abs(np.asarray(model.factors) - 1) < 0.1)
+    found = prnu(lit, dark, used)
+    assert found.value == pytest.approx(0.008, abs=3 * found.u)
 
 
 def test_a_sensor_without_differences_has_an_interval_from_0() -> None:
@@ -85,7 +116,9 @@ def test_the_flat_field_is_that_of_the_pixels_and_not_of_the_light() -> None:
     lit, dark = (stack_of(model, 0.03, 16, lit=lit) for lit in (True, False))
     measured = np.ones(SHAPE, dtype=bool)
     measured[:, :20] = False  # the surface does not reach so far
-    found = flat_maps(lit, dark.mean_dn, measured, darks(model).hot)
+    found = flat_maps(
+        lit, dark.mean_dn, measured, darks(model).hot, response_of(model, ResponseCurve())
+    )
     assert np.all(found.response[:, :20] == 1.0)
     assert {tuple(p) for p in np.argwhere(found.deviant).tolist()} == {(60, 20), (61, 90)}
     inner = found.measured & ~found.deviant

@@ -1,0 +1,65 @@
+"""Statistics of frames of one exposure: of each pixel, and of a patch of pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from analysis.calibration.level_series import LevelSeries
+from analysis.calibration.pixel_maps import Stack
+from instrument.devices import Frame
+from instrument.geometry import BoolArray, FloatArray
+
+Level = tuple[float, float, float, float, float, float]
+
+
+def stack_of(frames: Sequence[Frame]) -> Stack:
+    """Return mean and variance of each pixel; exact sums of whole numbers, frame by frame."""
+    shape = frames[0].image.shape
+    total, squares = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
+    for frame in frames:
+        counts = frame.image.astype(np.int64)
+        total += counts
+        squares += counts * counts
+    count = len(frames)
+    spread = (count * squares - total * total) / (count * (count - 1))
+    return Stack(
+        exposure_s=frames[0].exposure_s, mean_dn=total / count, variance_dn2=spread, frames=count
+    )
+
+
+def level_of(frames: Sequence[Frame], patch: BoolArray, start_s: float) -> Level:
+    """Return a row of a `LevelSeries` for the pixels of a patch (rows, columns).
+
+    Counts in DN, times in s from `start_s` on. The variance is without what a frame has in common.
+    """
+    counts = np.stack([frame.image[patch] for frame in frames]).astype(np.float64)
+    means = counts.mean(axis=1)
+    own = (counts - means[:, None]).var(axis=0, ddof=1)
+    middle_s = float(np.mean([frame.time_s for frame in frames]))
+    return (
+        frames[0].exposure_s, float(means.mean()), float(own.mean()),
+        float(means.var(ddof=1)), float(len(frames)), middle_s - start_s,
+    )  # fmt: skip
+
+
+def series_of(levels: Sequence[Level], pixels: int) -> LevelSeries:
+    """Return levels in the order of rising exposure, of equal exposures the first."""
+    kept = {level[0]: level for level in reversed(levels)}
+    columns: FloatArray = np.array([kept[exposure] for exposure in sorted(kept)]).T
+    return LevelSeries(
+        exposure_s=columns[0], mean_dn=columns[1], variance_dn2=columns[2],
+        scatter_dn2=columns[3], frames=columns[4], age_s=columns[5], pixels=pixels,
+    )  # fmt: skip
+
+
+def table_of(levels: LevelSeries) -> FloatArray:
+    """Return a series as a table (exposures, 6), in s, DN, DN squared, DN squared, 1 and s."""
+    return np.stack(
+        [
+            levels.exposure_s, levels.mean_dn, levels.variance_dn2, levels.scatter_dn2,
+            levels.frames, levels.age_s,
+        ],
+        axis=1,
+    )  # fmt: skip

@@ -1,0 +1,129 @@
+"""Measurement of a camera's calibration: darks, flat field and levels, with the rig's devices.
+
+Nothing moves. What is measured is checked at once, so that a covered lens or an open shutter costs
+no more than the step in which it shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.calibration import checks
+from acquisition.calibration.frame_statistics import level_of, series_of, stack_of
+from acquisition.calibration.patch import Patch, patch_of
+from acquisition.calibration.plan import FLAT_FRAMES, FLAT_TARGET, CalibrationPlan, nearest_s
+from acquisition.measure.hot_pixels import find_hot_pixels
+from analysis.calibration.level_series import LevelSeries
+from analysis.calibration.pixel_maps import Stack
+from instrument.devices import Camera, Frame, Lamp, Operator, Request
+
+_STEPS_OF_SEARCH = 6  # bisections: saturation is then known to 1 %
+_SEED = 1288  # of the order of exposures: the same each time
+PLACE = (
+    "Place a matt white surface on the table so that it fills the picture without gloss; the lamp "
+    "is on and warm, automatic exposure and gain are off"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """Measurement of a camera: levels of the patch, and stacks of whole pictures."""
+
+    lit: LevelSeries
+    dark: LevelSeries
+    flat: Stack
+    short_dark: Stack
+    long_dark: Stack
+    patch: Patch
+
+
+@dataclass(slots=True, kw_only=True)
+class CameraCalibrator:
+    """Devices of a rig at work on a plan; `say` tells the operator what is going on."""
+
+    plan: CalibrationPlan
+    camera: Camera
+    lamp: Lamp
+    operator: Operator
+    say: Callable[[str], None]
+
+    def measure(self) -> Measured:
+        """Measure everything; the lamp is left lit."""
+        self.operator.ask(Request("place", PLACE, surface="sample"))
+        darks = self._darks()
+        self.lamp.light()
+        flat = self._flat()
+        short, long = (stack_of(frames) for frames in (darks[0], darks[-1]))
+        hot = find_hot_pixels(long.mean_dn, self.plan.rig.camera)
+        patch = patch_of(flat, short, hot)
+        lit = self._levels(patch)
+        dark = [level_of(frames, patch.level, darks[0][0].time_s) for frames in darks]
+        return Measured(
+            lit=lit, dark=series_of(dark, patch.pixels), flat=flat, short_dark=short,
+            long_dark=long, patch=patch,
+        )  # fmt: skip
+
+    def _darks(self) -> list[list[Frame]]:
+        """Take frames without light at each exposure, rising."""
+        exposures = self.plan.dark_exposures_s()
+        self.say(f"darks: {len(exposures)} exposures")
+        self.lamp.darken()
+        taken = [self._frames(e, self.plan.dark_frames(e, exposures)) for e in exposures]
+        checks.require_exposures(exposures, [frames[0].exposure_s for frames in taken])
+        checks.require_dark(taken, self.plan.rig)
+        return taken
+
+    def _flat(self) -> Stack:
+        """Take the flat field near half of full scale."""
+        exposure_s = self._exposure_for(FLAT_TARGET)
+        self.say(f"flat field: {FLAT_FRAMES} frames at {exposure_s:g} s")
+        frames = self._frames(exposure_s, FLAT_FRAMES)
+        checks.require_unsaturated(frames, self.plan.rig)
+        return stack_of(frames)
+
+    def _levels(self, patch: Patch) -> LevelSeries:
+        """Take the lit levels in a random order."""
+        exposures = self.plan.lit_exposures_s(self._exposure_for(1.0, patch))
+        self.say(f"photon transfer: {len(exposures)} exposures to {exposures[-1]:.3g} s")
+        order = np.random.default_rng(_SEED).permutation(len(exposures)).tolist()
+        levels, start_s = [], None
+        for number in order:
+            frames = self._frames(exposures[number], self.plan.frames)
+            start_s = frames[0].time_s if start_s is None else start_s
+            levels.append(level_of(frames, patch.level, start_s))
+        return series_of(levels, patch.pixels)
+
+    def _exposure_for(self, share: float, patch: Patch | None = None) -> float:
+        """Return the exposure in seconds at which the bright pixels reach a share of full scale.
+
+        The longest one, if none does. It is found by halving intervals, which no gamma misleads.
+        """
+        camera = self.plan.rig.camera
+        low, high = camera.min_exposure_s, camera.max_exposure_s
+        if self._share(low, patch) >= share:
+            return low
+        while low < high and self._share(min(4 * low, high), patch) < share:
+            low = min(4 * low, high)
+        high = min(4 * low, high)
+        for _ in range(_STEPS_OF_SEARCH):
+            middle = nearest_s(float(np.sqrt(low * high)), camera)
+            if not low < middle < high:
+                break
+            low, high = (middle, high) if self._share(middle, patch) < share else (low, middle)
+        return low
+
+    def _share(self, exposure_s: float, patch: Patch | None) -> float:
+        """Return the level of the bright pixels of one frame, as a share of full scale."""
+        camera = self.plan.rig.camera
+        image = self._frames(exposure_s, 1)[0].image
+        level = np.percentile(image, 95) if patch is None else np.mean(image[patch.level])
+        black = camera.black_level_dn
+        return (float(level) - black) / (checks.SATURATED * camera.max_dn - black)
+
+    def _frames(self, exposure_s: float, count: int) -> list[Frame]:
+        """Take frames at an exposure in seconds, as nearly as the camera can set it."""
+        self.camera.set_exposure_s(exposure_s)
+        return self.camera.grab(count)

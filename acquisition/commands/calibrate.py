@@ -1,0 +1,90 @@
+"""Command `gonio calibrate camera`: measures a camera and writes its calibration. Nothing moves."""
+
+from __future__ import annotations
+
+import json
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+from acquisition.calibration.plan import CalibrationPlan
+from acquisition.calibration.procedure import CameraCalibrator
+from acquisition.calibration.result import calibration_of
+from acquisition.calibration.summary import summary_json, summary_lines
+from acquisition.commands.setup import require_rig
+from acquisition.rig import OpenRig, restart_for_emulated_camera
+from acquisition.terminal.console import console, out, print_lines, print_notes
+from acquisition.terminal.operator import require_terminal
+from acquisition.terminal.orderly_end import orderly_end
+from instrument.calibration.camera_calibration import CameraCalibration
+from instrument.calibration.camera_file import SUFFIX, write_camera_file
+from instrument.config.rig import Rig
+from instrument.errors import InputError
+
+_WHITE_FILLS = 3.0  # widths of the picture: size of the white surface in a scene
+
+
+def calibrate_camera(
+    rig_path: Path | None,
+    path: Path | None,
+    *,
+    exposures: int,
+    frames: int,
+    plan_only: bool,
+    as_json: bool,
+) -> None:
+    """Calibrate the camera of a rig and write the file `path`; `plan_only`: only say how."""
+    rig = require_rig(rig_path)
+    plan = CalibrationPlan(rig=rig, exposures=exposures, frames=frames)
+    if plan_only:
+        print_lines(plan.lines())
+        return
+    path = _require_path(path)
+    if rig.real:
+        require_terminal(str(rig_path))
+    restart_for_emulated_camera(rig)
+    with orderly_end():
+        calibration = _measured(plan)
+        written = write_camera_file(path, calibration)
+    _print(written, rig, path, as_json)
+
+
+def _require_path(path: Path | None) -> Path:
+    """Return the path of the file to be; raise `InputError` before anything is measured."""
+    if path is None:
+        raise InputError("gonio calibrate camera: name the file to write: -o FILE.npz")
+    if path.suffix != SUFFIX:
+        raise InputError(f"{path}: the file's name must end in {SUFFIX}")
+    if path.exists():
+        raise InputError(
+            f"{path}: exists already, and runs may name it: choose another name, as with the date"
+        )
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}: make it first")
+    return path
+
+
+def _measured(plan: CalibrationPlan) -> CameraCalibration:
+    rig = plan.rig
+    white_mm = _WHITE_FILLS * rig.camera.field_width_mm
+    with OpenRig(rig, white_mm=white_mm) as open_rig:
+        open_rig.pose_scene(0.0)
+        camera = open_rig.camera()
+        calibrator = CameraCalibrator(
+            plan=plan, camera=camera, lamp=open_rig.lamp, operator=open_rig.operator, say=_say
+        )
+        measured = calibrator.measure()
+        return calibration_of(measured, rig, camera, datetime.now(UTC))
+
+
+def _say(text: str) -> None:
+    console.print(text, highlight=False, soft_wrap=True)
+
+
+def _print(calibration: CameraCalibration, rig: Rig, path: Path, as_json: bool) -> None:
+    if as_json:
+        sys.stdout.write(json.dumps(summary_json(calibration, str(path))) + "\n")
+        return
+    print_lines(summary_lines(calibration, rig, out.width))
+    print_notes(calibration.notes)
+    print_lines([f"file: {path} (sha256 {calibration.sha256[:16]}...)"])
