@@ -14,6 +14,7 @@ import numpy as np
 
 from analysis.choice.adequacy import Agreement, agreement, without_outliers
 from analysis.choice.candidates import Candidates
+from analysis.choice.checks.all_checks import check_notes, free_check_notes
 from analysis.choice.ladder import CANDIDATES, MethodOfFit, rungs, with_method
 from analysis.choice.light import require_light
 from analysis.choice.notes import Note, fit_notes
@@ -135,7 +136,8 @@ def _chosen(tried: Candidates, fitted: _Fitted, acceptance: Acceptance | None) -
     m, eligible = tried.measurements, fitted.eligible
     if not eligible:
         shown = tuple(map(_best_values_only, fitted.results))
-        return Choice(shown, None, "none adequate", "no fit converged")
+        notes = free_check_notes(m)
+        return Choice(shown, None, "none adequate", "no fit converged", notes=notes)
     preferred, best = simplest(eligible, m), min(eligible, key=lambda c: c.bic)
     chosen = tried.profiled(preferred.model, acceptance)
     judged = agreement(chosen, m)
@@ -150,7 +152,11 @@ def _chosen(tried: Candidates, fitted: _Fitted, acceptance: Acceptance | None) -
         symmetry=symmetry(m, chosen.brdf, noise),
         agreeing=agreeing,
         u_scale=judged.u_scale,
-        notes=(*judged.notes, *fit_notes(chosen, best.model, m, tried.left_out)),
+        notes=(
+            *check_notes(tried, chosen, judged, acceptance),
+            *judged.notes,
+            *fit_notes(chosen, best.model, m, tried.left_out),
+        ),
     )
 
 

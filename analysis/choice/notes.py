@@ -31,6 +31,13 @@ class NoteCode(StrEnum):
     OUTSIDE_VALIDITY = "outside_validity"
     RELATIVE_VALUES = "relative_values"
     SEARCH_END = "search_end"
+    # Checks of the data: `analysis/choice/checks`.
+    NOT_RECIPROCAL = "not_reciprocal"
+    REFLECTANCE_ABOVE_ONE = "reflectance_above_one"
+    POSSIBLE_OUTLIERS = "possible_outliers"
+    COSINE_FACTOR = "cosine_factor"
+    ANGLE_UNIT = "angle_unit"
+    LAMP_SIDE = "lamp_side"
     # Source of the measurements.
     FLAGGED = "flagged"
     DAMAGED = "damaged"
