@@ -20,10 +20,10 @@ from analysis.calibration.level_series import (
     saturation_index,
 )
 from analysis.calibration.response_fit import ResponseFit
-from instrument.geometry import BoolArray, FloatArray
+from instrument.geometry import BoolArray, FloatArray, IntArray
 
 _SENSITIVITY = 0.7  # of the saturation: the range of the gain's fit (6.6 of the standard)
-_NOISE = 4.0  # standard deviations that reach from the mean of a cut-off level to its limit
+_NOISE = 4.0  # standard deviations within which a limit cuts off noise
 _ROUNDS = 4  # of the fit, whose weights depend on its result
 LEAST_NOISE_DN2 = 0.24  # below it rounding rules the dark noise (6.6 of the standard)
 
@@ -136,15 +136,24 @@ def _gain(
     return float(values[0]), float(values[1]), own, chi2
 
 
-def _points(lit: LevelSeries, dark: LevelSeries, response: ResponseFit, dark_dn: float) -> _Points:
-    """Return lit levels up to the limit of the standard, and darks.
+def _below_limit(lit: LevelSeries, response: ResponseFit) -> IntArray:
+    """Return the indices of the lit levels up to the limit of the standard.
 
-    Behind a gamma darks do not count: noise below black is cut off there.
+    Behind a gamma levels near black do not count: noise below black is cut off there.
     """
     signal = response.light(lit.mean_dn, lit.variance_dn2)
-    last = saturation_index(linear_variance_dn2(lit, response))
+    variance = linear_variance_dn2(lit, response)
+    last = saturation_index(variance)
     below = (signal <= _SENSITIVITY * signal[last]) & (np.arange(signal.size) <= last)
-    series = [lit.chosen(np.flatnonzero(below)), *([] if response.curve.is_video else [dark])]
+    if response.curve.is_video:
+        below &= signal * response.span_dn > _NOISE * np.sqrt(variance)
+    return np.flatnonzero(below)
+
+
+def _points(lit: LevelSeries, dark: LevelSeries, response: ResponseFit, dark_dn: float) -> _Points:
+    """Return lit levels up to the limit of the standard, and darks, but no darks behind a gamma."""
+    lit = lit.chosen(_below_limit(lit, response))
+    series = [lit] if response.curve.is_video else [lit, dark]
     mean, variance, frames, pixels = (
         np.concatenate(parts)
         for parts in zip(
