@@ -42,7 +42,14 @@ def fit_source(
         if names is None and way == "auto":
             names, way = source.fit.models, source.fit.method
         with sign_of_life(f"fit of {source.measurements.size} points"):
-            choice = choose(source.measurements, source.acceptance, names, robust, way)
+            choice = choose(
+                source.measurements,
+                source.acceptance,
+                names,
+                robust,
+                way,
+                certificate_leads=source.fit.certificate_leads,
+            )
     found = to_json(replace(choice, notes=(*source.notes, *choice.notes)))
     if as_json:
         print_json(found)

@@ -162,6 +162,7 @@ def fit_of(
     models: Sequence[str] | None,
     method: str,
     robust: bool,
+    certificate_leads: bool = False,
 ) -> Fit:
     """Choose a model; `used` is a mask (N,) of the points that are fitted, default all.
 
@@ -169,7 +170,9 @@ def fit_of(
     """
     way = _method(method)
     names = None if models is None else _names(models)
-    choice = choose(measurements, acceptance, names, robust, way)
+    choice = choose(
+        measurements, acceptance, names, robust, way, certificate_leads=certificate_leads
+    )
     all_points = np.ones(measurements.size, dtype=bool)
     return Fit(choice, measurements, points, all_points if used is None else used)
 

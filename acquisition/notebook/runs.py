@@ -141,6 +141,7 @@ class Run:
             models=asked.models if own else models,
             method=asked.method if own else method,
             robust=robust,
+            certificate_leads=asked.certificate_leads,
         )
 
     def plot(self) -> Figure:

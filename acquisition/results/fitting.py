@@ -64,7 +64,13 @@ def fit_run(reduced: Reduced, loaded: Loaded) -> Fitted:
     try:
         require_usable(reduced)
         fitted = measurements(reduced, loaded)
-        choice = choose(fitted, acceptance, asked.models, method=asked.method)
+        choice = choose(
+            fitted,
+            acceptance,
+            asked.models,
+            method=asked.method,
+            certificate_leads=asked.certificate_leads,
+        )
     except NotDetermined as error:
         return Fitted(None, reduced.valid, str(error), failure=error)
     except ValueError as error:  # values outside their domain, such as a u of 0

@@ -21,6 +21,7 @@ from acquisition.measure.drift import Drift, rate
 from acquisition.measure.placement import tilt_deg
 from acquisition.measure.white_tile import Standard, standard
 from analysis.data.measurements import SharedError
+from analysis.fit.certificate import CERTIFICATE
 from instrument.config.load import Loaded
 from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
@@ -33,7 +34,7 @@ from instrument.record.record import Record
 NOISE, ROUNDING, DRIFT = "photon and read noise", "rounding to counts", "lamp drift"
 DARK, PLACEMENT, TEXTURE = "dark frames", "sample placement", "texture at the window edge"
 NO_TILE_YET = "no white tile yet"
-TILE_READING, TILE = "white tile reading", "white tile certificate"
+TILE_READING, TILE = "white tile reading", CERTIFICATE
 TILE_PLACEMENT = "white tile placement"
 Doubts = Mapping[str, Container[int]]  # steps by flag
 _ANGLES = ("theta_i_deg", "theta_r_deg")

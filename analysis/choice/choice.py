@@ -17,12 +17,13 @@ from analysis.choice.candidates import Candidates
 from analysis.choice.checks.all_checks import check_notes, free_check_notes
 from analysis.choice.ladder import CANDIDATES, MethodOfFit, rungs, with_method
 from analysis.choice.light import require_light
-from analysis.choice.notes import Note, fit_notes
+from analysis.choice.notes import Note, certificate_note, fit_notes
 from analysis.choice.preference import simplest
 from analysis.choice.runs_test import worst_stretches
 from analysis.choice.symmetry_test import Symmetry, symmetry
 from analysis.data.acceptance import Acceptance
 from analysis.data.measurements import Measurements
+from analysis.fit.certificate import led_by_certificate
 from analysis.fit.criteria import LEAST_NOISE
 from analysis.fit.fit import FitResult
 from analysis.models import MODELS
@@ -68,6 +69,7 @@ def choose(
     models: Sequence[str] | None = None,
     robust: bool = False,
     method: MethodOfFit = "auto",
+    certificate_leads: bool = False,
 ) -> Choice:
     """Fit every model and choose the simplest that explains the data as well as the best does.
 
@@ -75,6 +77,8 @@ def choose(
     data and, within the models of up to three parameters, the next one, which may be right; an
     integrated model whose functional form is as accurate is then left out, unless a `method` for
     the rough surface is requested. Models with too many parameters for the points are left out.
+    `certificate_leads`: the chosen model's parameters are those at the scale of the certificate,
+    which the model's form may else correct (`analysis.fit.certificate`).
     Raises `NotDetermined` when the points are too few for all of them or show no light, `KeyError`
     for an unknown model.
     """
@@ -92,7 +96,7 @@ def choose(
         fitted = _Fitted((*fitted.results, *new.results), {**fitted.agreements, **new.agreements})
         if explained:
             break
-    return _chosen(tried, fitted, acceptance)
+    return _chosen(tried, fitted, acceptance, certificate_leads)
 
 
 def _rungs(
@@ -132,7 +136,9 @@ class _Fitted:
         return self.within_u or agreeing or [c for c in self.results if c.converged]
 
 
-def _chosen(tried: Candidates, fitted: _Fitted, acceptance: Acceptance | None) -> Choice:
+def _chosen(
+    tried: Candidates, fitted: _Fitted, acceptance: Acceptance | None, certificate_leads: bool
+) -> Choice:
     m, eligible = tried.measurements, fitted.eligible
     if not eligible:
         shown = tuple(map(_best_values_only, fitted.results))
@@ -143,6 +149,14 @@ def _chosen(tried: Candidates, fitted: _Fitted, acceptance: Acceptance | None) -
     judged = agreement(chosen, m)
     verdict, reason = _verdict(chosen, judged, m)
     agreeing = frozenset(c.model for c in fitted.results if fitted.agreements[c.model].agrees)
+    notes = (
+        *check_notes(tried, chosen, judged, acceptance),
+        *judged.notes,
+        *fit_notes(chosen, best.model, m, tried.left_out),
+        *(certificate_note(chosen, m, leads=certificate_leads) if judged.agrees else ()),
+    )
+    if certificate_leads:
+        chosen = led_by_certificate(chosen, m)
     noise = max(chosen.rms_relative, LEAST_NOISE) * float(np.mean(m.brdf))
     return Choice(
         candidates=tuple(_shown(c, chosen, agreeing) for c in fitted.results),
@@ -152,11 +166,7 @@ def _chosen(tried: Candidates, fitted: _Fitted, acceptance: Acceptance | None) -
         symmetry=symmetry(m, chosen.brdf, noise),
         agreeing=agreeing,
         u_scale=judged.u_scale,
-        notes=(
-            *check_notes(tried, chosen, judged, acceptance),
-            *judged.notes,
-            *fit_notes(chosen, best.model, m, tried.left_out),
-        ),
+        notes=notes,
     )
 
 

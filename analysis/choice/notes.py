@@ -12,9 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.data.measurements import Measurements
+from analysis.fit.certificate import certificate_u, told_by
 from analysis.fit.fit import FitResult
 
 _MOST_OUTLIERS = 10  # that are listed
+_OVERRULED = 0.8  # u of the certificate after the fit, in its own u, at which this deserves a note
 
 
 class NoteCode(StrEnum):
@@ -31,6 +33,7 @@ class NoteCode(StrEnum):
     OUTSIDE_VALIDITY = "outside_validity"
     RELATIVE_VALUES = "relative_values"
     SEARCH_END = "search_end"
+    SCALE_BY_FORM = "scale_by_form"
     # Checks of the data: `analysis/choice/checks`.
     NOT_RECIPROCAL = "not_reciprocal"
     REFLECTANCE_ABOVE_ONE = "reflectance_above_one"
@@ -88,6 +91,28 @@ def fit_notes(
         NoteCode.SEARCH_END: f"the search ended: {chosen.message}",
     }
     return tuple(Note(code, text) for code, text in texts.items() if text)
+
+
+def certificate_note(chosen: FitResult, m: Measurements, *, leads: bool) -> tuple[Note, ...]:
+    """State that the form of a model fixes the scale more closely than the certificate.
+
+    `leads`: the certificate leads all the same.
+    """
+    told, percent = told_by(chosen, m), 100 * certificate_u(m)
+    if told.u > _OVERRULED:
+        return ()
+    text = (
+        f"the form of {chosen.model} tells the error that all values have from the white tile's "
+        f"certificate: {told.pull * percent:+.2g} % with a u of {told.u * percent:.2g} %, where "
+        f"the certificate has {percent:.2g} %; "
+    )
+    text += (
+        "the certificate leads all the same, by fit: scale in the protocol"
+        if leads
+        else "the form leads, as far as the model holds; fit: scale: certificate in the protocol "
+        "lets the certificate lead"
+    )
+    return (Note(NoteCode.SCALE_BY_FORM, text),)
 
 
 def _noise_text(chosen: FitResult, m: Measurements) -> str:

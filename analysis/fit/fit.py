@@ -49,6 +49,10 @@ _CONTENDERS, _QUICK_RTOL = 4, 1e-2
 # Reduced chi2 beyond which a model is so far from the data that intervals would say nothing.
 _FAR_CHI2 = 25.0
 
+# Relative u of a shared error that may move the first fit, which does not know it, so far that the
+# covariance has to be linearised around a second one before a model is found to be far.
+_LARGE_SHARED = 0.01
+
 NOT_CONVERGED = "the averaging over lamp and lens did not converge"
 
 
@@ -179,6 +183,10 @@ def _linearised(first: FirstFit, m: Measurements) -> _Linearised:
     problem = replace(first.problem, covariance=full_covariance(m, first.brdf))
     lowest = sorted(first.starts, key=problem.chi2)[:_CONTENDERS]
     quick = min((problem.solve(x, rtol=_QUICK_RTOL) for x in lowest), key=lambda one: one.chi2)
+    if reduced_chi2(problem, quick) > _FAR_CHI2 and _largest_shared(m) > _LARGE_SHARED:
+        around = full_covariance(m, partial(problem.model_brdf, quick.x))
+        problem = replace(problem, covariance=around)
+        quick = problem.solve(quick.x, rtol=_QUICK_RTOL)
     if reduced_chi2(problem, quick) > _FAR_CHI2:
         return _Linearised(problem, quick, tuple(lowest))
     found = all_minima(problem, [quick.x, *lowest], enough_chi2(m, problem))
@@ -186,6 +194,10 @@ def _linearised(first: FirstFit, m: Measurements) -> _Linearised:
     problem = replace(problem, covariance=covariance)
     others = tuple(other.x for other in found[1:])
     return _Linearised(problem, deepest(problem, found[0].x, others), others)
+
+
+def _largest_shared(m: Measurements) -> float:
+    return max((float(np.max(np.abs(e.u_relative), initial=0.0)) for e in m.shared), default=0.0)
 
 
 def _rejected(fitted: AveragedFit) -> bool:

@@ -214,10 +214,17 @@ class FitConfig(Section):
     """Models to fit; by default all models of the ladder.
 
     `method` of computing a rough surface; auto: the cheapest that is accurate enough for the data.
+    `scale`: that of the white tile's certificate, or as far as the model's form corrects it.
     """
 
     models: Annotated[list[Name], Field(min_length=1)] | None = None
     method: Literal["auto", "qualitative", "functional", "exact"] = "auto"
+    scale: Literal["model", "certificate"] = "model"
+
+    @property
+    def certificate_leads(self) -> bool:
+        """True if the model's form does not correct the scale."""
+        return self.scale == "certificate"
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
         """Refuse a method beside `models`, whose names already state it."""

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from acquisition.engine.engine import Engine
 from acquisition.plan.plan import make_plan
 from acquisition.results.fitting import Fitted, fit_run, u_without
-from acquisition.results.reduction import DARK, ROUNDING, Reduced, reduced_run
+from acquisition.results.reduction import DARK, NOISE, ROUNDING, TILE, Reduced, reduced_run
 from acquisition.results.run_folder import run_meta
 from acquisition.results.summary import budget, headline, notes, value_text
 from acquisition.rig import open_devices
+from analysis.models import MODELS
 from analysis.report.data import Parameter
 from instrument.config.load import Loaded
+from instrument.config.protocol import FitConfig
+from instrument.geometry import Geometry
 from instrument.record.event_kinds import INTERLOCK
 from instrument.record.reading import Check
 from instrument.record.record import Record
-from tests.support.scans import small_scan
+from tests.support.scans import changed, exact_rig, small_scan
 
 Results = tuple[Loaded, Reduced, Fitted, tuple[str, ...]]
 
@@ -49,6 +54,28 @@ def test_notes_name_the_simulation_the_tile_and_the_camera_s_rounding(results: R
     assert "all data are simulated" in found
     assert any(note.startswith("the white tile is assumed to be Lambertian; ") for note in found)
     assert any(note.startswith("8-bit camera: rounding frames") for note in found)
+
+
+def test_the_protocol_lets_the_certificate_lead(results: Results) -> None:
+    """The form of exact values would tell the scale of a rough surface; this key forbids it."""
+    loaded, reduced, _, _ = results
+    angles = {n: [getattr(p, f"{n}_deg") for p in reduced.points] for n in ("theta_i", "theta_r")}
+    rough = MODELS["oren_nayar"].brdf(Geometry.from_degrees(**angles), albedo=0.8, sigma_deg=30.0)
+    precise = replace(
+        reduced,
+        brdf=rough,
+        components={NOISE: np.full(rough.size, 5e-5)},
+        shared=(),
+        shared_by_tile=tuple(e for e in reduced.shared_by_tile if e.name == TILE),
+    )
+    u = {}
+    for scale in ("model", "certificate"):
+        asked = FitConfig(models=["oren_nayar"], scale=scale)
+        exact = replace(changed(loaded, fit=asked), rig=exact_rig(loaded.rig))
+        chosen = fit_run(precise, exact).chosen
+        assert chosen is not None
+        u[scale] = (chosen.u["albedo"] or 0.0) / 0.8
+    assert u["model"] < 0.8 * 0.005 / 0.99 < u["certificate"]
 
 
 def test_less_rounding_never_costs_u(results: Results) -> None:
