@@ -152,6 +152,8 @@ def _tile_note(reduced: Reduced, loaded: Loaded) -> str:
             "the white tile is assumed to be Lambertian; sintered PTFE is not, by some 4 % at 30 "
             "and 60 deg and 7 % at 0 and 70 deg: state its `certificate` or a `table`"
         )
+    if tile.certificate == "lambertian":
+        return "the white tile is Lambertian by its certificate in the protocol"
     if not found.departure.any():
         return f"the white tile's number is used at its certificate's geometry, {tile.certificate}"
     return (

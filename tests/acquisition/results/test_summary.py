@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,12 +18,13 @@ from acquisition.rig import open_devices
 from analysis.models import MODELS
 from analysis.report.data import Parameter
 from instrument.config.load import Loaded
-from instrument.config.protocol import FitConfig
+from instrument.config.protocol import FitConfig, WhiteTile
 from instrument.geometry import Geometry
 from instrument.record.event_kinds import INTERLOCK
 from instrument.record.reading import Check
 from instrument.record.record import Record
 from tests.support.scans import changed, exact_rig, small_scan
+from tests.support.white_tiles import SPECTRALON, table_text, tabled, with_tile
 
 Results = tuple[Loaded, Reduced, Fitted, tuple[str, ...]]
 
@@ -54,6 +56,33 @@ def test_notes_name_the_simulation_the_tile_and_the_camera_s_rounding(results: R
     assert "all data are simulated" in found
     assert any(note.startswith("the white tile is assumed to be Lambertian; ") for note in found)
     assert any(note.startswith("8-bit camera: rounding frames") for note in found)
+
+
+@pytest.mark.parametrize(
+    ("keys", "note"),
+    [
+        ({"certificate": "lambertian"}, "the white tile is Lambertian by its certificate in the"),
+        ({"certificate": "8/hemispherical"}, "certified at 8/hemispherical and used elsewhere: a u"
+         " of 4 % is added; a `table`"),
+        ({"certificate": "45/0"}, "certified at 45/0 and used elsewhere: a u of 4 % is added"),
+        ({}, "the white tile is assumed to be Lambertian; sintered PTFE is not, by some 4 % at 30"),
+    ],
+)  # fmt: skip
+def test_a_note_says_how_far_the_tile_s_number_holds(
+    keys: dict[str, str], note: str, results: Results, record: Record
+) -> None:
+    loaded, reduced, fitted, _ = results
+    tile = WhiteTile(reflectance=0.99, u_reflectance=0.005, theta_r_deg=10.0)
+    stated = with_tile(loaded, tile.model_copy(update=keys))
+    assert sum(note in text for text in notes(reduced, fitted, record, stated)) == 1
+
+
+def test_a_note_gives_the_span_of_a_table(results: Results, record: Record, tmp_path: Path) -> None:
+    loaded, reduced, fitted, _ = results
+    tabled_scan = with_tile(loaded, tabled(table_text(SPECTRALON, 0.003, 0.0), tmp_path))
+    text = "radiance factor is 0.959 to 1.029 at the angles of its readings, linear between the"
+    found = notes(reduced, fitted, record, tabled_scan)
+    assert [n for n in found if "radiance factor" in n and text in n]
 
 
 def test_the_protocol_lets_the_certificate_lead(results: Results) -> None:

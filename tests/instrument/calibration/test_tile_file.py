@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from instrument.calibration.tile_file import read_tile_table
-from instrument.calibration.tile_table import ANGLES
+from instrument.calibration.tile_table import ANGLES, TileTable
 from instrument.errors import InputError
 
 TABLE = """\
@@ -176,3 +176,34 @@ def test_any_grid_is_read_as_it_is_written(seed: int) -> None:
         row = written[tuple(a[i] for a, i in zip(table.axes_deg, index, strict=True))]
         found = (table.beta[index], table.u_beta[index], table.u_common[index])
         assert found == (row["beta"], row["u_beta"], row.get("u_beta_common", 0.0))
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1))
+def test_any_damaged_file_is_read_or_refused_with_a_place(seed: int) -> None:
+    """Bytes lost, doubled, exchanged or made up."""
+    random, raw = np.random.default_rng(seed), bytearray(TABLE.encode())
+    for _ in range(int(random.integers(1, 6))):
+        at, kind = int(random.integers(len(raw))), int(random.integers(4))
+        if kind == 0:
+            raw[at] = int(random.integers(256))
+        elif kind == 1:
+            del raw[at : at + int(random.integers(1, 40))]
+        elif kind == 2:
+            raw[at:at] = raw[at : at + int(random.integers(1, 40))]
+        else:
+            raw[at:at] = bytes(random.choice(list(b'0123456789.,-\n"#en'), 3).tolist())
+    Path("tile.csv").write_bytes(bytes(raw))
+    found = table_or_problems(Path("tile.csv"))
+    if isinstance(found, TileTable):
+        assert found.beta.size >= 2
+        assert np.all(np.isfinite(found.beta) & (found.u_beta < found.beta / 2))
+    else:
+        assert all(problem.startswith(("tile.csv:", "... and")) for problem in found)
+
+
+def table_or_problems(path: Path) -> TileTable | tuple[str, ...]:
+    try:
+        return read_tile_table(path)
+    except InputError as error:
+        return error.problems
