@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import replace
+from datetime import UTC, datetime
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -40,15 +41,33 @@ _AXIS_TEXT = {  # in the operator's prompts
 
 
 def check_ready(loaded: Loaded) -> None:
-    """Raise `InputError` if a real rig has no operator at a terminal; call it before a scan.
+    """Raise `InputError` if a scan cannot begin; call it before one.
 
-    The program restarts here where the rig's camera is emulated.
+    A real rig needs an operator at a terminal, and a calibration must be that of its camera. The
+    program restarts here where the rig's camera is emulated.
     """
     if loaded.rig.real:
         from acquisition.terminal.operator import require_terminal
 
         require_terminal(str(loaded.protocol_path))
     restart_for_emulated_camera(loaded.rig)
+    measured = loaded.rig.camera.measured
+    if measured is not None:
+        with orderly_end(), OpenRig(loaded.rig, faults=Faults()) as rig:
+            camera = rig.camera()
+            name = f"{loaded.rig_path}: camera: calibration: {loaded.rig.camera.calibration}"
+            measured.require_camera(name, camera.identity(), camera.settings())
+
+
+def require_dated(loaded: Loaded) -> None:
+    """Raise `InputError` if the calibration of the camera is outdated; call it before a new scan.
+
+    A resumed scan goes on with the calibration that it began with.
+    """
+    measured = loaded.rig.camera.measured
+    if measured is not None:
+        name = f"{loaded.rig_path}: camera: calibration: {loaded.rig.camera.calibration}"
+        measured.require_date(name, datetime.now(UTC))
 
 
 def restart_for_emulated_camera(rig: Rig) -> None:

@@ -26,7 +26,7 @@ from acquisition.results.run_folder import (
     run_meta,
     write_run_inputs,
 )
-from acquisition.rig import check_ready
+from acquisition.rig import check_ready, require_dated
 from acquisition.terminal.console import console
 from acquisition.terminal.operator import require_yes
 from acquisition.terminal.orderly_end import orderly_end
@@ -62,6 +62,7 @@ def scan_into(loaded: Loaded, out: Path | None, finish: Callable[[Record], objec
     `run_protocol` does, and what `finish` raises.
     """
     plan = make_plan(loaded)
+    require_dated(loaded)
     check_ready(loaded)
     folder = out if out is not None else default_folder(loaded)
     require_disk_space(plan, loaded, folder)

@@ -8,13 +8,13 @@ along the surface. The second is computed: no image at one height shows it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.measure.window import Window
-from instrument.devices import Frame
 from instrument.geometry import FloatArray, IntArray
 
 
@@ -61,14 +61,14 @@ def tilt_deg(angle_deg: FloatArray, height_mm: float, distance_mm: float) -> Flo
 
 
 def placement_u_dn(
-    frames: Sequence[Frame], dark: FloatArray, window: Window, placement: Placement
+    image: NDArray[Any], dark: FloatArray, window: Window, placement: Placement
 ) -> tuple[float, float]:
     """Return the effect in DN of a surface u_mm closer to the camera: first and second order.
 
-    `dark`: mean dark (rows, columns) in DN. The first is signed.
+    `image`: one frame, `dark`: mean dark, both (rows, columns) in DN. The first is signed.
     """
-    first, second = _shifted_window(frames[0].image, dark, window, placement.u_mm)
-    signal = window.mean(frames[0].image[window.crop] - dark[window.crop])
+    first, second = _shifted_window(image, dark, window, placement.u_mm)
+    signal = window.mean(image[window.crop] - dark[window.crop])
     return first + signal * placement.u_irradiance, second
 
 

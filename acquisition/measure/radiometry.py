@@ -15,7 +15,7 @@ from acquisition.measure.placement import Placement, placement_u_dn
 from acquisition.measure.rounding import dark_rounding_dn, rounding_u_dn
 from acquisition.measure.window import Window
 from instrument.config.camera import CameraConfig
-from instrument.devices import Frame, Image
+from instrument.devices import Frame
 from instrument.geometry import BoolArray, FloatArray
 
 SATURATION_FRACTION = 0.97  # of full scale: above it the response is not trusted
@@ -62,8 +62,9 @@ class Signal:
 
 
 def average_dark(frames: Sequence[Frame], camera: CameraConfig) -> Dark:
-    """Return the dark of a series of frames taken without light."""
-    mean, variance = _mean_and_variance([frame.image for frame in frames], camera)
+    """Return the dark of a series of frames taken without light, in linear counts."""
+    images = [camera.linear_dn(frame.image) for frame in frames]
+    mean, variance = _mean_and_variance(images, camera)
     hot = find_hot_pixels(mean, camera)
     return Dark(frames[0].exposure_s, mean, variance, len(frames), hot if hot.any() else None)
 
@@ -82,11 +83,14 @@ def measure(
     placement: Placement,
     min_pixels: int,
 ) -> Signal:
-    """Return the window's mean over all frames minus the dark, with uncertainty and flags."""
+    """Return the window's mean over all frames minus the dark, with uncertainty and flags.
+
+    Each pixel's counts are made linear before they are averaged, where the camera is calibrated.
+    """
     window, hot_share = without_hot_pixels(window, dark.hot)
     crops = [frame.image[window.crop] for frame in frames]
     counted = [crop[window.counted] for crop in crops]
-    mean, variance = _mean_and_variance(crops, camera)
+    mean, variance = _mean_and_variance([camera.linear_dn(crop) for crop in crops], camera)
     saturated = [(crop >= camera.max_dn) & window.counted for crop in crops]
     saturated_weight = float(np.mean([window.weights[pixels].sum() for pixels in saturated]))
     peak = bright_level(counted[0]) if counted[0].size else float("nan")
@@ -95,7 +99,8 @@ def measure(
     u_dark_noise = _u_noise(window, dark_variance / dark.frames)
     # In another pose the light in a dark is between none and twice as much, with equal probability.
     u_light = dark.light_dn * float(window.weights.sum()) / math.sqrt(3.0)
-    u_placement, u_texture = placement_u_dn(frames, dark.mean, window, placement)
+    first = camera.linear_dn(frames[0].image)
+    u_placement, u_texture = placement_u_dn(first, dark.mean, window, placement)
     u_hot = hot_share * _spread(mean - dark_mean, window)
     # A saturated pixel is short of its true count by up to full scale, or more.
     u_saturated = saturated_weight * (camera.max_dn - camera.black_level_dn)
@@ -119,7 +124,7 @@ def _spread(signal: FloatArray, window: Window) -> float:
 
 
 def _mean_and_variance(
-    images: Sequence[Image], camera: CameraConfig
+    images: Sequence[NDArray[Any]], camera: CameraConfig
 ) -> tuple[FloatArray, FloatArray]:
     """Return mean (DN) and frame-to-frame variance (DN^2) of every pixel, each (rows, columns).
 

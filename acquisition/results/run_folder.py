@@ -1,8 +1,9 @@
 """Folder of a run: its name, its copies of its input files, and the data that identify the run.
 
-They are the protocol, the rig, and the table of the white tile if the protocol names one. The
-record keeps the texts and their SHA-256. The copies are for people and for `load_run_inputs`,
-which refuses a copy that was edited: readings before and after the edit would not belong together.
+They are the protocol, the rig, the table of the white tile if the protocol names one, and the
+calibration of the camera, without pixel maps, if the rig names one. The record keeps the texts and
+their SHA-256. The copies are for people and for `load_run_inputs`, which refuses a copy that was
+edited: readings before and after the edit would not belong together.
 """
 
 from __future__ import annotations
@@ -22,8 +23,14 @@ from instrument.record.record import Record
 from instrument.text.atomic_file import write_whole
 
 PROTOCOL_FILE, RIG_FILE, TILE_FILE = "protocol.yaml", "rig.yaml", "white_tile.csv"
-# By the record's key of the text; there is one of the white tile only where the protocol names it.
-_FILES = {"protocol": PROTOCOL_FILE, "rig": RIG_FILE, "white_tile": TILE_FILE}
+CALIBRATION_FILE = "camera_calibration.json"
+# By the record's key of the text; the last two only where protocol and rig name them.
+_FILES = {
+    "protocol": PROTOCOL_FILE,
+    "rig": RIG_FILE,
+    "white_tile": TILE_FILE,
+    "camera_calibration": CALIBRATION_FILE,
+}
 
 
 def default_folder(loaded: Loaded) -> Path:
@@ -48,15 +55,15 @@ def run_meta(loaded: Loaded, plan: Plan) -> dict[str, str]:
         "planned_s": f"{plan.duration_s:.1f}",
         "hidden": str(len(plan.hidden)),
         "steps": str(len(plan.steps)),
-        **_tile_meta(loaded),
+        **_text_meta("white_tile", loaded.tile_text),
+        **_text_meta("camera_calibration", loaded.calibration_text),
         **loaded.protocol.metadata.given(),
     }
 
 
-def _tile_meta(loaded: Loaded) -> dict[str, str]:
-    """Return the table of the white tile; nothing without one."""
-    text = loaded.tile_text
-    return {} if text is None else {"white_tile": text, "white_tile_sha256": _digest(text)}
+def _text_meta(key: str, text: str | None) -> dict[str, str]:
+    """Return the text of a file that not every run has, with its hash; nothing without one."""
+    return {} if text is None else {key: text, f"{key}_sha256": _digest(text)}
 
 
 def write_run_inputs(record: Record) -> None:
@@ -82,10 +89,14 @@ def load_run_inputs(record: Record) -> Loaded:
         folder / RIG_FILE,
         check_model=check_model,
         tile_path=folder / TILE_FILE,
+        calibration_path=folder / CALIBRATION_FILE,
     )
     texts = {
-        "protocol": loaded.protocol_text, "rig": loaded.rig_text, "white_tile": loaded.tile_text
-    }  # fmt: skip
+        "protocol": loaded.protocol_text,
+        "rig": loaded.rig_text,
+        "white_tile": loaded.tile_text,
+        "camera_calibration": loaded.calibration_text,
+    }
     for key, name in _FILES.items():
         text = texts[key]
         if record.meta(f"{key}_sha256") != (None if text is None else _digest(text)):

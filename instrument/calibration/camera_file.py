@@ -51,10 +51,7 @@ def write_camera_file(path: Path, calibration: CameraCalibration) -> CameraCalib
 
 def read_camera_file(path: Path) -> CameraCalibration:
     """Read a calibration; raise `InputError` if it is none, damaged, or of another version."""
-    try:
-        raw = read_file(path, _MOST_BYTES)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}): check its name") from error
+    raw = _bytes_of(path)
     try:
         header, arrays = _unpacked(raw)
     except (zipfile.BadZipFile, KeyError, ValueError, EOFError, OSError) as error:
@@ -70,7 +67,35 @@ def read_camera_file(path: Path) -> CameraCalibration:
     digest = header.pop("sha256", None)
     if digest != _digest(header, arrays):
         raise InputError(f"{path}: was changed or damaged since it was written. Calibrate again")
-    return _calibration(path, header, arrays, digest)
+    _require_arrays(path, arrays)
+    return replace(_calibration(path, header, digest), arrays=arrays)
+
+
+def header_text(calibration: CameraCalibration) -> str:
+    """Return all but the arrays as the text that a run keeps: see `read_camera_header`."""
+    header = {**_header(calibration), "sha256": calibration.sha256}
+    return json.dumps(header, indent=1, ensure_ascii=False) + "\n"
+
+
+def read_camera_header(path: Path) -> CameraCalibration:
+    """Read the copy that a run keeps of a calibration, without arrays; raise `InputError`.
+
+    Who wrote it, the run, proves it by a hash of its own.
+    """
+    try:
+        header = json.loads(_bytes_of(path))
+        digest = header.pop("sha256")
+    except (ValueError, KeyError, AttributeError, TypeError) as error:
+        raise InputError(f"{path}: is no copy of a camera calibration ({error})") from error
+    return _calibration(path, header, digest)
+
+
+def _bytes_of(path: Path) -> bytes:
+    try:
+        return read_file(path, _MOST_BYTES)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read ({reason}): check its name") from error
 
 
 def _header(calibration: CameraCalibration) -> dict[str, Any]:
@@ -113,18 +138,15 @@ def _unpacked(raw: bytes) -> tuple[dict[str, Any], dict[str, Any]]:
     return header, arrays
 
 
-def _calibration(
-    path: Path, header: dict[str, Any], arrays: dict[str, Any], digest: str
-) -> CameraCalibration:
-    """Return the calibration that a file holds; its hash was found right."""
+def _calibration(path: Path, header: dict[str, Any], digest: str) -> CameraCalibration:
+    """Return the calibration that a file holds, without arrays; its hash was found right."""
     try:
-        _require_arrays(arrays)
         curve = header["curve"]
         quantities = {key: Quantity(**own) for key, own in header["quantities"].items()}
         own = {k: v for k, v in header.items() if k not in ("format", "version")}
         own.update(
             curve=ResponseCurve(curve["kind"], tuple(map(float, curve["parameters"]))),
-            quantities=quantities, notes=tuple(header["notes"]), arrays=arrays, sha256=digest,
+            quantities=quantities, notes=tuple(header["notes"]), arrays={}, sha256=digest,
         )  # fmt: skip
         found = CameraCalibration(**own)
         ends = found.linear_counts_dn(np.array([found.black_dn, found.max_dn]))
@@ -137,11 +159,14 @@ def _calibration(
     return found
 
 
-def _require_arrays(arrays: dict[str, Any]) -> None:
-    """Raise `ValueError` if a map is missing or of another shape than the others."""
-    shapes = {arrays[name].shape for name in MAPS}
-    if len(shapes) != 1 or len(next(iter(shapes))) != 2:
-        raise ValueError(f"pixel maps of the shapes {sorted(shapes)}")
-    for table in ("lit", "dark"):
-        if arrays[table].ndim != 2 or arrays[table].shape[1] != len(LEVEL_COLUMNS):
-            raise ValueError(f"table {table} of the shape {arrays[table].shape}")
+def _require_arrays(path: Path, arrays: dict[str, Any]) -> None:
+    """Raise `InputError` if a map is missing or of another shape than the others."""
+    wanted = {*MAPS, "lit", "dark"}
+    shapes = {name: array.shape for name, array in arrays.items()}
+    maps = {shapes.get(name) for name in MAPS}
+    tables = {shapes.get(name, ())[1:] for name in ("lit", "dark")}
+    if not wanted <= set(shapes) or len(maps) != 1 or tables != {(len(LEVEL_COLUMNS),)}:
+        raise InputError(
+            f"{path}: lacks what a calibration needs: its arrays have the shapes {shapes}. "
+            "Calibrate again"
+        )

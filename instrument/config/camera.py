@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from functools import lru_cache
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, PrivateAttr
 
+from instrument.calibration.camera_calibration import CameraCalibration
+from instrument.calibration.response_curve import ResponseCurve
 from instrument.config.section import Finite, Name, NotNegative, Positive, Section
 
 V4L2_EXPOSURE_STEP_S = 1e-4
@@ -15,12 +20,20 @@ LIMITED_BLACK_DN, LIMITED_WHITE_DN = 16, 235
 _BIT_DEPTHS = {"GREY": (8, 8), "YUYV": (8, 8), "Y10": (10, 10), "Y16": (9, 16)}
 
 
+@lru_cache(maxsize=4)
+def _linear_counts_dn(curve: ResponseCurve, black_dn: float, max_dn: int) -> NDArray[np.float64]:
+    """Return the linear count of each count (max_dn + 1,), in DN."""
+    span = max_dn - black_dn
+    return black_dn + span * curve.light((np.arange(max_dn + 1.0) - black_dn) / span)
+
+
 class CameraConfig(Section):
     """Camera on the beam: image, field of view, sensor and exposure.
 
     `reconnect_s`: time for which a scan waits for a camera whose connection was lost.
     `u_black_level_dn`: standard deviation of the black level from frame to frame; the default is
-    that of a clamp which regulates to a fraction of a count.
+    that of a clamp which regulates to a fraction of a count. `calibration`: file of `gonio
+    calibrate camera`, beside the rig file; counts are made linear with its response curve.
     """
 
     width_px: Annotated[int, Field(ge=16, le=16384)]
@@ -39,6 +52,30 @@ class CameraConfig(Section):
     max_exposure_s: Positive
     frame_overhead_s: NotNegative
     reconnect_s: Annotated[float, Field(ge=0, le=3600)] = 30.0
+    calibration: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
+    _measured: CameraCalibration | None = PrivateAttr(None)
+
+    @property
+    def measured(self) -> CameraCalibration | None:
+        """Content of the file `calibration`; None without one, and where no scan needs it."""
+        return self._measured
+
+    def with_measured(self, measured: CameraCalibration) -> Self:
+        """Return a copy that holds the content of its `calibration`."""
+        camera = self.model_copy()
+        camera._measured = measured
+        return camera
+
+    def linear_dn(self, counts: NDArray[Any]) -> NDArray[Any]:
+        """Return counts of any shape, in DN, made linear in light; unchanged if not calibrated.
+
+        Black and the largest count stay in their place.
+        """
+        if self._measured is None:
+            return counts
+        own = self._measured
+        table = _linear_counts_dn(own.curve, own.black_dn, self.max_dn)
+        return np.asarray(table[np.minimum(counts, self.max_dn)])
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
         """Check the order of exposures, the axis inside the image, and the black level."""

@@ -7,12 +7,13 @@ valid by themselves are checked against each other even if others are not.
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
 from pydantic import ValidationError
 
+from instrument.calibration.camera_file import header_text, read_camera_file, read_camera_header
 from instrument.calibration.tile_file import read_tile_table
 from instrument.config.file_role import wrong_role
 from instrument.config.protocol import Protocol
@@ -47,9 +48,18 @@ class Loaded:
         tile = self.protocol.references.white_tile
         return tile.values.text if tile is not None and tile.values is not None else None
 
+    @property
+    def calibration_text(self) -> str | None:
+        """Text of the camera's calibration without pixel maps; None without a calibration."""
+        measured = self.rig.camera.measured
+        return None if measured is None else header_text(measured)
+
 
 def load_rig(path: Path) -> Rig:
-    """Read a rig file. Raises `InputError` with every mistake in it."""
+    """Read a rig file. Raises `InputError` with every mistake in it.
+
+    The calibration of its camera is for scans, and is not read.
+    """
     file = _read(path, Rig)
     rig = file.check(Rig)
     if rig is None or file.found:
@@ -63,10 +73,12 @@ def load_protocol(
     *,
     check_model: ModelCheck | None = None,
     tile_path: Path | None = None,
+    calibration_path: Path | None = None,
 ) -> Loaded:
-    """Read a protocol, its rig, and the table of its white tile.
+    """Read a protocol, its rig, the table of its white tile, and the calibration of its camera.
 
-    `rig_path` replaces the rig that the protocol names, `tile_path` the table of the tile.
+    `rig_path` replaces the rig that the protocol names, `tile_path` the table of the tile, and
+    `calibration_path`, a run's copy, the calibration.
 
     `check_model(name, parameters)` returns what is wrong with a model of the protocol, or None;
     parameters are None if the protocol only names the model. Raises `InputError` with every mistake
@@ -84,6 +96,8 @@ def load_protocol(
     files = [file] if rig_file is None else [file, rig_file]
     try:
         protocol = protocol and _with_tile_table(file, protocol, tile_path)
+        if rig is not None and rig_file is not None:
+            rig = _with_calibration(rig_file, rig, calibration_path)
     except InputError as error:
         raise InputError(*_report(*files), *error.problems) from None
     if protocol is None or rig is None or rig_file is None or any(f.found for f in files):
@@ -148,6 +162,24 @@ def _with_tile_table(file: _File, protocol: Protocol, path: Path | None) -> Prot
         return protocol
     references = protocol.references.model_copy(update={"white_tile": whole})
     return protocol.model_copy(update={"references": references})
+
+
+def _with_calibration(file: _File, rig: Rig, copy: Path | None) -> Rig:
+    """Return the rig with the calibration of its camera; a mistake is added if it is unusable."""
+    camera = rig.camera
+    if camera.calibration is None:
+        return rig
+    try:
+        named = file.path.parent / camera.calibration
+        measured = read_camera_file(named) if copy is None else read_camera_header(copy)
+    except InputError as error:
+        file.add(("camera", "calibration"), error.problems[0])
+        return rig
+    if measured.max_dn != camera.max_dn:
+        text = f"of a camera with counts to {measured.max_dn:g}; allowed: to {camera.max_dn}"
+        file.add(("camera", "calibration"), f"{camera.calibration}: {text}")
+    measured = replace(measured, arrays={})  # a scan has no use for the pixel maps
+    return rig.model_copy(update={"camera": camera.with_measured(measured)})
 
 
 def _report(*files: _File) -> list[str]:

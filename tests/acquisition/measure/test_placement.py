@@ -53,7 +53,9 @@ def _stated(loaded: Loaded, angles: tuple[float, float, float], image: FloatArra
     placement = Placement(U_MM, theta_i, rig.lamp_distance_mm)
     no_dark = np.zeros_like(image)
     frame = Frame(image, 1.0, 0.0)  # type: ignore[arg-type]  # not rounded to counts
-    shown = placement_u_dn([frame], no_dark, window, placement)[0] / window.mean(image[window.crop])
+    shown = placement_u_dn(frame.image, no_dark, window, placement)[0] / window.mean(
+        image[window.crop]
+    )
     sample = loaded.protocol.simulated_sample
     assert sample is not None
     di, dr = (
