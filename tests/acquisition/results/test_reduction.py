@@ -8,7 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.results.reduction import DRIFT, TILE_PLACEMENT, reduce, root_sum_square
+from acquisition.results.fitting import measurements
+from acquisition.results.measurements_csv import measurements_csv
+from acquisition.results.reduction import DRIFT, TILE, TILE_PLACEMENT, reduce, root_sum_square
+from analysis.data.csv_table import read_table
 from analysis.models import MODELS
 from instrument.config.load import Loaded
 from instrument.config.protocol import WhiteTile
@@ -197,3 +200,18 @@ def test_a_constant_table_reduces_as_its_number(
     assert first.parts.keys() == second.parts.keys()
     for name, u in first.parts.items():
         np.testing.assert_array_equal(u, second.parts[name])
+
+
+def test_a_table_of_results_states_the_errors_of_the_tile_s_table(
+    full: Loaded, seen_with_ptfe: list[Reading], tmp_path: Path
+) -> None:
+    loaded = with_tile(full, tabled(table_text(SPECTRALON, 0.003, 0.004), tmp_path))
+    found = reduce(seen_with_ptfe, loaded.protocol, ())
+    path = tmp_path / "measurements.csv"
+    path.write_text(measurements_csv(found, 0.01 * found.brdf, loaded))
+    read, own = (
+        [(e.name, e.u_relative.tolist(), e.group.tolist()) for e in m.shared if e.name == TILE]
+        for m in (read_table(path).measurements, measurements(found, loaded))
+    )
+    assert len(own) >= 2
+    assert read == own

@@ -76,16 +76,17 @@ def test_where_the_certificate_leads_no_form_corrects_the_scale(seed: int, off_u
     assert led.chi2 == found.chi2
 
 
-def test_the_u_of_a_led_fit_is_the_spread_over_certificates() -> None:
+@pytest.mark.slow
+def test_the_u_of_a_led_fit_is_the_spread_over_certificates(slow: bool) -> None:
     """Over drawn errors of the certificate and of the values."""
     random, values, stated = np.random.default_rng(18), [], []
-    for seed in range(60):
+    for seed in range(400 if slow else 20):
         m = certified("oren_nayar", seed, float(random.standard_normal()), **ROUGH)
         led = led_by_certificate(fit(MODELS["oren_nayar"], m), m)
         values.append(list(led.values.values()))
         stated.append([u_of(led, name) for name in ROUGH])
     spread = np.std(np.array(values) - [0.8, 30.0], axis=0)
-    np.testing.assert_allclose(spread, np.mean(stated, axis=0), rtol=0.3)
+    np.testing.assert_allclose(spread, np.mean(stated, axis=0), rtol=0.12 if slow else 0.5)
 
 
 def test_a_choice_says_which_one_leads() -> None:
