@@ -16,7 +16,7 @@ LEAST_EXPOSURES, MOST_EXPOSURES = 12, 200
 LEAST_FRAMES, MOST_FRAMES = 2, 64
 DARK_EXPOSURES = 6
 FLAT_FRAMES = 16
-FLAT_TARGET = 0.5  # of full scale: EMVA 1288, release 4.0 Linear, 8.1
+FLAT_TARGET = 0.5  # of full scale: where EMVA 1288 measures PRNU
 _LOW = 4  # exposures below those of the even ladder, where a gamma bends most
 _TOP = 1.15  # of the exposure that saturates: some levels must be above it
 

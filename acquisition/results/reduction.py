@@ -32,6 +32,7 @@ from instrument.record.record import Record
 
 # Components of uncertainty, and flags of points, as files and reports call them.
 NOISE, ROUNDING, DRIFT = "photon and read noise", "rounding to counts", "lamp drift"
+LINEARITY = "linearity of the camera"
 DARK, PLACEMENT, TEXTURE = "dark frames", "sample placement", "texture at the window edge"
 NO_TILE_YET = "no white tile yet"
 TILE_READING, TILE = "white tile reading", CERTIFICATE
@@ -115,7 +116,13 @@ def reduced_run(record: Record, loaded: Loaded) -> Reduced:
     """Return radiance and BRDF of all points in a run's record, complete or not."""
     readings = record.readings()
     doubted = doubted_steps(readings, record.events())
-    return reduce(readings, loaded.protocol, record.checks(), doubted)
+    reduced = reduce(readings, loaded.protocol, record.checks(), doubted)
+    measured = loaded.rig.camera.measured
+    if measured is None:
+        return reduced
+    # The response is wrong alike at equal counts only, and what is common is part of the scale.
+    u = np.full(len(reduced.points), measured.u_light_relative)
+    return replace(reduced, components={**reduced.components, LINEARITY: u})
 
 
 def require_usable(reduced: Reduced) -> None:

@@ -1,4 +1,4 @@
-"""Linearity error of EMVA 1288, release 4.0 Linear, chapter 6.7."""
+"""Linearity error of EMVA 1288, release 4.0 Linear."""
 
 from __future__ import annotations
 

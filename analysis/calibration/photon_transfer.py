@@ -1,6 +1,6 @@
 """Photon transfer: gain, dark noise, dark current and saturation from means and variances.
 
-Method and definitions of EMVA 1288, release 4.0 Linear, chapters 6 and 7; with u from sampling,
+Method and definitions of EMVA 1288, release 4.0 Linear; with u from sampling,
 rounding to counts and the response curve. Counts are first made linear with that curve: for a
 linear camera this changes nothing, for others the standard's equations would not hold.
 """
@@ -22,10 +22,10 @@ from analysis.calibration.level_series import (
 from analysis.calibration.response_fit import ResponseFit
 from instrument.geometry import BoolArray, FloatArray, IntArray
 
-_SENSITIVITY = 0.7  # of the saturation: the range of the gain's fit (6.6 of the standard)
+_SENSITIVITY = 0.7  # of the saturation: the range of the standard for the gain
 _NOISE = 4.0  # standard deviations within which a limit cuts off noise
 _ROUNDS = 4  # of the fit, whose weights depend on its result
-LEAST_NOISE_DN2 = 0.24  # below it rounding rules the dark noise (6.6 of the standard)
+LEAST_NOISE_DN2 = 0.24  # by the standard: below it rounding rules the dark noise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,6 +1,6 @@
 """Maps of a sensor's pixels: dark offset and dark current, hot pixels, PRNU and DSNU, flat field.
 
-PRNU1288 and DSNU1288 of EMVA 1288, release 4.0 Linear, chapter 8, from high-passed pictures: the
+PRNU1288 and DSNU1288 of EMVA 1288, release 4.0 Linear, from high-passed pictures: the
 light of a lamp on a surface, and the shading of a lens, are no property of the pixels. Defect
 pixels are left out. All maps have the shape (rows, columns).
 """
@@ -15,7 +15,7 @@ from analysis.calibration.level_series import ROUNDING_DN2, Estimate, rounding_o
 from analysis.calibration.response_fit import ResponseFit
 from instrument.geometry import BoolArray, FloatArray
 
-_HIGH_PASS, _FLAT = 5, 15  # side of the squares of neighbours; 5 is that of the standard (8.8)
+_HIGH_PASS, _FLAT = 5, 15  # side of the squares of neighbours; 5 is that of the standard
 _OUTLIER = 7.0  # times the scatter of the pixels: none of 10 million of a normal distribution
 _LEAST_NEIGHBOURS = 10
 _NORMAL_MAD = 1.4826  # standard deviation of a normal distribution by its median deviation

@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from acquisition.plan.plan import make_plan
+from acquisition.results.reduction import LINEARITY, reduced_run
 from acquisition.results.run_folder import (
     CALIBRATION_FILE,
     load_run_inputs,
@@ -63,10 +64,16 @@ def loaded(bench: Path, rig: str) -> Loaded:
 
 
 def rates(bench: Path, rig: str, folder: Path) -> np.ndarray:
-    """Counts per second of each reading of a scan."""
+    """Counts per second of each reading of a scan; the u of its points is checked too."""
     own = loaded(bench, rig)
     with Record.create(folder / rig, run_meta(own, make_plan(own))) as record:
         scan(own, record)
+        parts, measured = reduced_run(record, own).parts, own.rig.camera.measured
+        if measured is None:
+            assert LINEARITY not in parts
+        else:
+            assert parts[LINEARITY] == pytest.approx(measured.u_light_relative)
+            assert measured.u_light_relative > 0
         return np.array([r.signal_dn / r.exposure_s for r in record.readings()])
 
 
