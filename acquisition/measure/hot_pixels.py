@@ -1,7 +1,8 @@
-"""Hot pixels: found in the darks, left out of the window's mean.
+"""Hot and dead pixels: left out of the window's mean.
 
 The dark current of a hot pixel is subtracted with the dark, but it fills the pixel's well: at a
-long exposure the pixel saturates although the sample is dark.
+long exposure the pixel saturates although the sample is dark. Hot pixels are found in the darks. A
+pixel that has died since then shows less than its dark, which no light does.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from instrument.config.camera import CameraConfig
 from instrument.geometry import BoolArray, FloatArray
 
 LARGEST_EXCESS = 0.05  # of the range of counts: a pixel so much above its neighbours is hot
+_BELOW_SIGMA, _BELOW_DN = 8.0, 2.0  # less than a dark by as much is no noise, and no rounding
 _NEIGHBOURS = 5  # rows and columns around a pixel; the glow of an amplifier is even over them
 _MOST_NAMED = 1000
 
@@ -36,7 +38,23 @@ def without_hot_pixels(window: Window, hot: BoolArray | None) -> tuple[Window, f
     that their sum stays the same.
     """
     own = None if hot is None else hot[window.crop] & window.counted
-    if own is None or not own.any():
+    return (window, 0.0) if own is None else _without(window, own)
+
+
+def without_dead_pixels(
+    window: Window, signal_dn: FloatArray, variance_dn2: FloatArray
+) -> tuple[Window, float]:
+    """Return the window without dead pixels, and the share of its weight that they had.
+
+    `signal_dn`: (rows, columns) of the window's crop, its dark subtracted; `variance_dn2` that of
+    noise without light, in the same shape.
+    """
+    least = -_BELOW_SIGMA * np.sqrt(variance_dn2) - _BELOW_DN
+    return _without(window, (signal_dn < least) & window.counted)
+
+
+def _without(window: Window, own: BoolArray) -> tuple[Window, float]:
+    if not own.any():
         return window, 0.0
     share = float(window.weights[own].sum() / window.weights.sum())
     kept = np.where(own, 0.0, window.weights) / max(1.0 - share, 1e-9)

@@ -10,7 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.measure.hot_pixels import find_hot_pixels, without_hot_pixels
+from acquisition.measure.hot_pixels import (
+    find_hot_pixels,
+    without_dead_pixels,
+    without_hot_pixels,
+)
 from acquisition.measure.placement import Placement, placement_u_dn
 from acquisition.measure.rounding import dark_rounding_dn, rounding_u_dn
 from acquisition.measure.window import Window
@@ -46,7 +50,7 @@ class Signal:
 
     `u_placement_dn` is the first-order effect of a misplaced sample, with the sign of the change
     for a sample too close to the camera; `u_texture_dn` is the second-order effect, with the effect
-    of hot pixels left out and of single saturated ones. `window_pixels`: area that counts.
+    of hot and dead pixels left out and of single saturated ones. `window_pixels`: area that counts.
     """
 
     signal_dn: float
@@ -89,19 +93,21 @@ def measure(
     """
     window, hot_share = without_hot_pixels(window, dark.hot)
     crops = [frame.image[window.crop] for frame in frames]
-    counted = [crop[window.counted] for crop in crops]
     mean, variance = _mean_and_variance([camera.linear_dn(crop) for crop in crops], camera)
+    dark_mean, dark_variance = dark.mean[window.crop], dark.variance[window.crop]
+    black = photon_transfer(dark_mean, camera) * (1 / len(frames) + 1 / dark.frames)
+    window, dead_share = without_dead_pixels(window, mean - dark_mean, black)
+    counted = [crop[window.counted] for crop in crops]
     saturated = [(crop >= camera.max_dn) & window.counted for crop in crops]
     saturated_weight = float(np.mean([window.weights[pixels].sum() for pixels in saturated]))
     peak = bright_level(counted[0]) if counted[0].size else float("nan")
-    dark_mean, dark_variance = dark.mean[window.crop], dark.variance[window.crop]
     rounding, u_rounding = dark_rounding_dn(dark_mean, dark_variance, window.weights, dark.frames)
     u_dark_noise = _u_noise(window, dark_variance / dark.frames)
     # In another pose the light in a dark is between none and twice as much, with equal probability.
     u_light = dark.light_dn * float(window.weights.sum()) / math.sqrt(3.0)
     first = camera.linear_dn(frames[0].image)
     u_placement, u_texture = placement_u_dn(first, dark.mean, window, placement)
-    u_hot = hot_share * _spread(mean - dark_mean, window)
+    u_left_out = (hot_share + dead_share) * _spread(mean - dark_mean, window)
     # A saturated pixel is short of its true count by up to full scale, or more.
     u_saturated = saturated_weight * (camera.max_dn - camera.black_level_dn)
     return Signal(
@@ -110,11 +116,11 @@ def measure(
         u_quantisation_dn=_u_rounding(window.mean(mean), camera),
         u_dark_dn=math.hypot(u_dark_noise, u_rounding, u_light),
         u_placement_dn=u_placement,
-        u_texture_dn=math.hypot(u_texture, u_hot, u_saturated),
+        u_texture_dn=math.hypot(u_texture, u_left_out, u_saturated),
         window_pixels=window.pixels,
         saturated_pixels=sum(int(np.count_nonzero(pixels)) for pixels in saturated),
         peak_dn=peak,
-        flags=_flags(window, min_pixels, (saturated_weight, hot_share), peak, camera),
+        flags=_flags(window, min_pixels, (saturated_weight, hot_share, dead_share), peak, camera),
     )
 
 
@@ -170,19 +176,20 @@ def photon_transfer(mean: FloatArray, camera: CameraConfig) -> FloatArray:
 def _flags(
     window: Window,
     min_pixels: int,
-    shares: tuple[float, float],
+    shares: tuple[float, float, float],
     peak_dn: float,
     camera: CameraConfig,
 ) -> str:
     """Return the reading's flags separated by semicolons; empty if there are none.
 
-    `shares` of the window's weight: saturated pixels, hot pixels that were left out.
+    `shares` of the window's weight: saturated pixels, hot and dead ones that were left out.
     """
-    saturated, hot = shares
+    saturated, hot, dead = shares
     flags = {
         LEAVES_FRAME: not window.inside_frame,
         FEW_PIXELS: window.pixels < min_pixels,
         "saturated": saturated > SATURATED_SHARE or peak_dn >= SATURATION_FRACTION * camera.max_dn,
         "hot pixels": hot > HOT_SHARE,
+        "dead pixels": dead > HOT_SHARE,
     }
     return "; ".join(name for name, raised in flags.items() if raised)

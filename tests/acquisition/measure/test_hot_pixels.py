@@ -10,9 +10,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.measure.hot_pixels import find_hot_pixels, hot_pixel_text, without_hot_pixels
+from acquisition.measure.hot_pixels import (
+    find_hot_pixels,
+    hot_pixel_text,
+    without_dead_pixels,
+    without_hot_pixels,
+)
 from acquisition.measure.placement import Placement
-from acquisition.measure.radiometry import SATURATED_SHARE, Dark, average_dark, measure
+from acquisition.measure.radiometry import (
+    SATURATED_SHARE,
+    Dark,
+    average_dark,
+    measure,
+    photon_transfer,
+)
 from acquisition.measure.window import window_at
 from acquisition.results.reduction import reduced_run
 from instrument.config.camera import CameraDefects
@@ -136,3 +147,46 @@ def test_all_positions_are_told_up_to_a_thousand() -> None:
     assert text.startswith("1200 hot pixels at 0.5 s")
     assert text.endswith("and 200 more")
     assert text.count("(") - 1 == 1000
+
+
+@given(
+    seed=st.integers(0, 10**6), count=st.integers(1, 12), spread=st.floats(1.0, 150.0),
+    frames=st.integers(1, 4),
+)  # fmt: skip
+def test_leaving_out_dead_pixels_changes_the_mean_within_the_stated_uncertainty(
+    seed: int, count: int, spread: float, frames: int
+) -> None:
+    random, image = np.random.default_rng(seed), np.rint(_textured(seed, spread))
+    rows, columns = (random.integers(s.start, s.stop, count) for s in WINDOW.crop)
+    dead_image = image.copy()
+    dead_image[rows, columns] = 0.0
+    dark = Dark(1.0, np.full(SHAPE, CAMERA.black_level_dn), np.ones(SHAPE), 8)
+    clean, spoilt = (
+        measure([Frame(i.astype(np.uint16), 1.0, 0.0)] * frames, dark, WINDOW, CAMERA, ON_AXIS, 100)
+        for i in (image, dead_image)
+    )
+    assert abs(spoilt.signal_dn - clean.signal_dn) <= 3 * max(spoilt.u_texture_dn, 1e-9)
+    assert spoilt.flags == ""
+
+
+@pytest.mark.parametrize("columns", [1, 20])
+def test_dead_columns_are_left_out_or_flagged(columns: int) -> None:
+    image = np.full(SHAPE, 1500, dtype=np.uint16)
+    image[:, MIDDLE[1] : MIDDLE[1] + columns] = 0
+    dark = Dark(1.0, np.full(SHAPE, CAMERA.black_level_dn), np.ones(SHAPE), 8)
+    found = measure([Frame(image, 1.0, 0.0)], dark, WINDOW, CAMERA, ON_AXIS, 100)
+    assert found.flags == "dead pixels"  # a column is more than 1 % of a small window
+    assert found.signal_dn == pytest.approx(1500 - CAMERA.black_level_dn, rel=1e-3)
+
+
+def test_no_noise_of_a_black_sample_is_a_dead_pixel() -> None:
+    random = np.random.default_rng(3)
+    noise = np.sqrt(photon_transfer(np.array(CAMERA.black_level_dn), CAMERA))
+    for frames, dark_frames in ((1, 1), (1, 16), (4, 4)):
+        level = random.normal(CAMERA.black_level_dn, noise, (frames + dark_frames, *SHAPE))
+        counts = np.rint(level)
+        signal = counts[:frames].mean(axis=0) - counts[frames:].mean(axis=0)
+        variance = np.full(SHAPE, noise**2 * (1 / frames + 1 / dark_frames))
+        kept, share = without_dead_pixels(WINDOW, signal[WINDOW.crop], variance[WINDOW.crop])
+        assert kept is WINDOW
+        assert share == 0.0
