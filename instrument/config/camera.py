@@ -13,6 +13,7 @@ from pydantic import Field, PrivateAttr
 from instrument.calibration.camera_calibration import CameraCalibration
 from instrument.calibration.response_curve import ResponseCurve
 from instrument.config.section import Finite, Name, NotNegative, Positive, Section
+from instrument.config.simulated.spread import Size, Spread
 
 V4L2_EXPOSURE_STEP_S = 1e-4
 # ITU-R BT.601: luma of limited range has black at 16 and white at 235.
@@ -171,11 +172,16 @@ class V4l2CameraConfig(CameraConfig):
 AnyCamera = Annotated[SimulatedCameraConfig | V4l2CameraConfig, Field(discriminator="driver")]
 
 
-class HotPixel(Section):
-    """Pixel with a dark current of its own, in addition to that of all pixels."""
+class DeadPixel(Section):
+    """Pixel without any response to light."""
 
     row: Annotated[int, Field(ge=0)]
     column: Annotated[int, Field(ge=0)]
+
+
+class HotPixel(DeadPixel):
+    """Pixel with a dark current of its own, in addition to that of all pixels."""
+
     electrons_per_s: Positive
 
 
@@ -193,6 +199,12 @@ class CameraDefects(Section):
     1/gamma. `nonlinearity`: relative excess of the counts of a small signal, which falls linearly
     to 0 at full scale. Pixels, drawn from the rig's seed: `prnu`: relative standard deviation of
     their responses to light. `dsnu_electrons`: standard deviation of their dark signals.
+    `hot_share`: share of the pixels that are hot, with dark currents that are distributed
+    exponentially about `hot_electrons_per_s`; `dead_share`: share that are dead, `dead_pixels`:
+    some by their place.
+
+    Temperature: the sensor warms by `warming_k` after the start of the scan, with the time constant
+    `warming_s`; all dark currents double every `doubling_k`.
     """
 
     fixed_exposure_s: Positive | None = None
@@ -202,6 +214,13 @@ class CameraDefects(Section):
     hot_pixels: list[HotPixel] = Field(default_factory=list)
     limited_range: Literal["none", "declared", "undeclared"] = "none"
     gamma: Annotated[float, Field(ge=0.2, le=5)] = 1.0
-    nonlinearity: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
-    prnu: Annotated[float, Field(ge=0, le=0.2)] = 0.0
-    dsnu_electrons: NotNegative = 0.0
+    nonlinearity: Annotated[float, Field(ge=-0.5, le=0.5), Spread.SIGNED] = 0.0
+    prnu: Annotated[float, Field(ge=0, le=0.2), Spread.SIZE] = 0.0
+    dsnu_electrons: Size = 0.0
+    dead_pixels: list[DeadPixel] = Field(default_factory=list)
+    hot_share: Annotated[float, Field(ge=0, le=0.1), Spread.SIZE] = 0.0
+    hot_electrons_per_s: Positive = 2000.0
+    dead_share: Annotated[float, Field(ge=0, le=0.1), Spread.SIZE] = 0.0
+    warming_k: Size = 0.0
+    warming_s: Positive = 1800.0
+    doubling_k: Positive = 7.0

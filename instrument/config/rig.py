@@ -14,6 +14,13 @@ from pydantic import Field
 from instrument.config.axes import AXES, EMULATED, Axes, HandAxis, SimulatedAxis, Wired
 from instrument.config.camera import AnyCamera, CameraDefects, SimulatedCameraConfig
 from instrument.config.section import Finite, Name, NotNegative, Positive, Section
+from instrument.config.simulated.defects import (
+    AxesDefects,
+    LampDefects,
+    LensDefects,
+    Placement,
+)
+from instrument.config.simulated.spread import Share, Signed, Spread
 
 _RANGES = ("theta_i_deg", "dphi_deg", "theta_r_deg")
 Range = Annotated[list[Finite], Field(min_length=2, max_length=2)]
@@ -70,37 +77,53 @@ class SimulatedTile(Section):
 
     `at_normal` * (1 - `falloff` * ((1 - cos theta_i) + (1 - cos theta_r))
     + `forward` * sin^2 theta_i sin^2 theta_r (1 - cos dphi) / 2). Sintered PTFE is like 1.057, 0.18
-    and 0.5, within 3 % up to theta_i 75 deg seen at 10 deg.
+    and 0.5, within 3 % up to theta_i 75 deg seen at 10 deg. `aged`: relative loss of all of it
+    since its certificate.
     """
 
     at_normal: Annotated[float, Field(gt=0, le=2)] = 1.0
     falloff: Annotated[float, Field(ge=0, le=0.5)] = 0.0
     forward: Annotated[float, Field(ge=0, le=5)] = 0.0
+    aged: Share = 0.0
 
 
 class Simulation(Section):
-    """Hidden properties of a simulated rig: noise seed, lamp drift, position of the sample.
+    """Hidden properties of a simulated rig: noise seed, lamp drift, places, and all defects.
 
-    `sample_height_mm`: distance of the sample's surface from the rotation axis, towards the camera.
+    `sample_height_mm`, `tile_height_mm`: distance of the surface from the rotation axis, towards
+    the camera; that of the tile is added to an error of placement drawn from the seed.
     `lamp_drift_per_hour`: relative change of the lamp's output. `tile`: the white tile; without it,
-    matt, and as reflecting as the protocol says, but for an error of its u.
+    matt, and as reflecting as the protocol says, but for an error of its u. `wall_light`: light of
+    the lamp that comes back from the surroundings, evenly from all directions: its irradiance
+    relative to the lamp's at normal incidence. `drawn`: the sizes of the defects are drawn from the
+    seed, with the spreads that the documentation of rig files lists.
     """
 
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
-    sample_height_mm: Finite = 0.0
-    lamp_drift_per_hour: Annotated[float, Field(gt=-1, lt=1)] = 0.0
+    drawn: bool = False
+    sample_height_mm: Signed = 0.0
+    tile_height_mm: Signed = 0.0
+    lamp_drift_per_hour: Annotated[float, Field(gt=-1, lt=1), Spread.SIGNED] = 0.0
     background_reflectance: Annotated[float, Field(ge=0, le=1)] = 0.02
+    wall_light: Share = 0.0
     camera_defects: CameraDefects = CameraDefects()
+    lamp_defects: LampDefects = LampDefects()
+    lens_defects: LensDefects = LensDefects()
+    axis_defects: AxesDefects = AxesDefects()
+    sample_placement: Placement = Placement()
+    tile_placement: Placement = Placement()
     tile: SimulatedTile | None = None
 
     def outside(self, width_px: int, height_px: int) -> Iterator[str]:
-        """Yield the hot pixels that lie outside an image of this size, in words."""
-        for pixel in self.camera_defects.hot_pixels:
-            if pixel.row >= height_px or pixel.column >= width_px:
-                yield (
-                    f"hot pixel in row {pixel.row}, column {pixel.column}; allowed: rows up to "
-                    f"{height_px - 1}, columns up to {width_px - 1}"
-                )
+        """Yield the hot and dead pixels that lie outside an image of this size, in words."""
+        defects = self.camera_defects
+        for kind, pixels in (("hot", defects.hot_pixels), ("dead", defects.dead_pixels)):
+            for pixel in pixels:
+                if pixel.row >= height_px or pixel.column >= width_px:
+                    yield (
+                        f"{kind} pixel in row {pixel.row}, column {pixel.column}; allowed: rows up "
+                        f"to {height_px - 1}, columns up to {width_px - 1}"
+                    )
 
 
 class Rig(Section):

@@ -1,6 +1,8 @@
-"""Defects of a camera: false exposures, hot and unequal pixels, response curve, limited range."""
+"""Defects of a camera: false exposures, hot, dead and unequal pixels, response, limited range."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,11 +38,16 @@ def read_back_s(set_s: float, defects: CameraDefects) -> float:
     return true_exposure_s(set_s, defects) if defects.reads_back == "taken" else set_s
 
 
-def hot_electrons_per_s(shape: tuple[int, int], defects: CameraDefects) -> FloatArray | None:
+def hot_electrons_per_s(
+    shape: tuple[int, int], defects: CameraDefects, random: np.random.Generator
+) -> FloatArray | None:
     """Return the extra dark current (rows, columns) in electrons/s; None without hot pixels."""
-    if not defects.hot_pixels:
+    if not defects.hot_pixels and not defects.hot_share:
         return None
     current = np.zeros(shape)
+    if defects.hot_share:
+        hot = random.random(shape) < defects.hot_share
+        current[hot] = random.exponential(defects.hot_electrons_per_s, int(hot.sum()))
     for pixel in defects.hot_pixels:
         current[pixel.row, pixel.column] += pixel.electrons_per_s
     return current
@@ -50,9 +57,22 @@ def unequal_responses(
     shape: tuple[int, int], defects: CameraDefects, random: np.random.Generator
 ) -> FloatImage | None:
     """Return the relative response to light of each pixel (rows, columns); None if all equal."""
-    if not defects.prnu:
+    if not (defects.prnu or defects.dead_pixels or defects.dead_share):
         return None
-    return (1 + defects.prnu * random.standard_normal(shape)).astype(np.float32)
+    responses = (1 + defects.prnu * random.standard_normal(shape)).astype(np.float32)
+    if defects.dead_share:
+        responses[random.random(shape) < defects.dead_share] = 0.0
+    for pixel in defects.dead_pixels:
+        responses[pixel.row, pixel.column] = 0.0
+    return responses
+
+
+def dark_current_factor(age_s: float, defects: CameraDefects) -> float:
+    """Return the factor of all dark currents by the warmth `age_s` after the start of the scan."""
+    if not defects.warming_k:
+        return 1.0
+    warmer_k = -defects.warming_k * math.expm1(-max(age_s, 0.0) / defects.warming_s)
+    return float(2 ** (warmer_k / defects.doubling_k))
 
 
 def unequal_darks_electrons(

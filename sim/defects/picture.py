@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instrument.config.camera import CameraConfig
+from instrument.config.simulated.defects import LensDefects
 from instrument.devices import Image
+from sim.defects.lens import veiled
 from sim.defects.world import World
 
 _SPOT_AT, _SPOT_RADIUS = 0.06, 0.02  # of the picture's width: in the window, off its middle
@@ -20,17 +22,19 @@ _DARK = 0.02  # of the light, in the shadow of a hand
 FloatImage = NDArray[np.float32]
 
 
-def scattered(light: FloatImage, world: World, px_per_mm: float) -> FloatImage:
+def scattered(light: FloatImage, world: World, lens: LensDefects, px_per_mm: float) -> FloatImage:
     """Return the picture of the lamp's light behind a hand and through a faulty lens.
 
-    `px_per_mm`: scale of the picture at the axis.
+    `lens`: its lasting defects; `world`: those of the moment. `px_per_mm`: scale at the axis.
     """
     if world.shadow:
         light = light.copy()
         light[:, : round(world.shadow * light.shape[1])] *= _DARK
-    if world.blur_mm:
-        sigma_px = world.blur_mm * px_per_mm
+    sigma_px = float(np.hypot(world.blur_mm * px_per_mm, lens.defocus_px))
+    if sigma_px:
         light = np.asarray(cv2.GaussianBlur(light, (0, 0), sigma_px), dtype=np.float32)
+    if lens.glare:
+        light = veiled(light, lens.glare, lens.glare_width * light.shape[1])
     if world.glare:
         light = light + np.float32(world.glare) * light.mean()
     return light

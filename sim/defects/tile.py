@@ -16,4 +16,5 @@ def radiance_factor(geometry: Geometry, tile: SimulatedTile) -> FloatArray:
     cos_i, cos_r = np.cos(geometry.theta_i), np.cos(geometry.theta_r)
     falling = tile.falloff * ((1.0 - cos_i) + (1.0 - cos_r))
     grazing = (1.0 - cos_i**2) * (1.0 - cos_r**2) * (1.0 - geometry.cos_dphi) / 2.0
-    return np.maximum(tile.at_normal * (1.0 - falling + tile.forward * grazing), 0.0)
+    at_normal = tile.at_normal * (1.0 - tile.aged)
+    return np.maximum(at_normal * (1.0 - falling + tile.forward * grazing), 0.0)

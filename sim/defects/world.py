@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
-import numpy as np
-
 from instrument.geometry import FloatArray
+from sim.defects.mechanics import placement
 
 Mounted = Literal["as asked", "sample", "white tile", "nothing"]
 
@@ -90,9 +89,7 @@ class World:
 
     def placement(self) -> FloatArray:
         """Return the matrix (3, 3) from points (x, y, 1), in mm, of the surface to the table."""
-        turn = np.radians(self.turn_deg)
-        c, s = float(np.cos(turn)), float(np.sin(turn))
-        return np.array([[c, -s, self.shift_mm], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return placement(self.shift_mm, 0.0, self.turn_deg)
 
 
 SOUND = World()

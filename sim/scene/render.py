@@ -16,9 +16,13 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from analysis.data.acceptance import Acceptance, radiance, required_rings
+from instrument.config.simulated.defects import LensDefects
 from instrument.geometry import FloatArray
 from instrument.pinhole import Pinhole, apply_homography, rectangle_mm
 from instrument.pixel_coverage import Coverage, polygon_coverage
+from sim.defects.lamp import beam_profile, wall_radiance
+from sim.defects.lens import bent_by_lens, transmission
+from sim.defects.mechanics import leaning_homography, turned
 from sim.defects.picture import scattered
 from sim.scene.scene import Scene
 
@@ -31,8 +35,9 @@ FloatImage = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class _Projection:
-    """Homography from the sample plane to the image, and the sample's outline in the image."""
+    """Homographies to the image from the table and from the surface, and the surface's outline."""
 
+    table: FloatArray
     homography: FloatArray
     outline: Coverage
 
@@ -48,23 +53,31 @@ def electrons_per_s(scene: Scene) -> FloatImage:
     if projection.outline.fraction.size and scene.mounted is not None:
         covered = projection.outline.fraction.astype(np.float32)
         image[crop] += covered * (_surface_radiance(scene, projection) - image[crop])
-    image *= _response(Pinhole.of(rig), rig.lamp.white_electrons_per_s)
-    return scattered(image, scene.world, rig.camera.width_px / rig.camera.field_width_mm)
+    lens = rig.simulation.lens_defects
+    image = bent_by_lens(image, lens)
+    image *= _response(Pinhole.of(rig), rig.lamp.white_electrons_per_s, lens)
+    return scattered(image, scene.world, lens, rig.camera.width_px / rig.camera.field_width_mm)
 
 
 def _project(scene: Scene) -> _Projection:
     pinhole = Pinhole.of(scene.rig)
     height_mm = 0.0 if scene.mounted is None else scene.heights_mm[scene.mounted]
-    homography = pinhole.homography(scene.seen_deg()["theta_r"], height_mm)
-    homography = homography @ scene.world.placement()
+    table = leaning_homography(
+        pinhole, scene.in_plane_angles().theta_r, height_mm, scene.placement.tilt_across_deg
+    )
+    table = scene.picture_shift() @ table
+    homography = table @ scene.placement_matrix()
     corners = apply_homography(homography, rectangle_mm(*scene.size_mm))
-    return _Projection(homography, polygon_coverage(corners, pinhole.width_px, pinhole.height_px))
+    return _Projection(
+        table, homography, polygon_coverage(corners, pinhole.width_px, pinhole.height_px)
+    )
 
 
 def _background_radiance(scene: Scene) -> float:
     """Radiance of the dark optical table behind the sample, taken as Lambertian."""
-    cos_i = max(0.0, float(np.cos(np.radians(scene.seen_deg()["theta_i"]))))
-    return scene.rig.simulation.background_reflectance / np.pi * cos_i
+    simulation = scene.rig.simulation
+    cos_i = max(0.0, float(np.cos(np.radians(scene.seen_angles().theta_i))))
+    return simulation.background_reflectance / np.pi * (cos_i + simulation.wall_light)
 
 
 def _surface_radiance(scene: Scene, projection: _Projection) -> FloatImage:
@@ -75,7 +88,7 @@ def _surface_radiance(scene: Scene, projection: _Projection) -> FloatImage:
     grid_y, matrix_y = _chebyshev_grid(rows)
     columns_px, rows_px = np.meshgrid(outline.column + grid_x, outline.row + grid_y)
     pixels: FloatArray = np.stack([columns_px, rows_px], axis=-1)
-    to_plane: FloatArray = np.linalg.inv(projection.homography).astype(np.float64)
+    to_plane: FloatArray = np.linalg.inv(projection.table).astype(np.float64)
     values = _radiance_at(scene, apply_homography(to_plane, pixels))
     smooth: FloatImage = (matrix_y @ values.astype(np.float32)) @ matrix_x.T
     if scene.mounted == "sample" and scene.sample.mottling > 0:
@@ -93,12 +106,15 @@ def _chebyshev_grid(pixels: int) -> tuple[FloatArray, FloatImage]:
 
 
 def _radiance_at(scene: Scene, points_mm: FloatArray) -> FloatArray:
-    """Radiance at points (..., 2) of the surface, seen from the lens."""
-    seen_deg = scene.seen_deg()
+    """Radiance at points (..., 2) of the table, at the surface's height, seen from the lens."""
+    seen, simulation = scene.seen_angles(), scene.rig.simulation
+    points_mm = turned(points_mm, seen.turn_deg)
     height = np.full(points_mm.shape[:-1], scene.heights_mm[scene.mounted or "sample"])
     flat = np.dstack([points_mm, height]).reshape(-1, 3)
-    angles = (seen_deg["theta_i"], seen_deg["theta_r"], seen_deg["dphi"])
+    angles = (seen.theta_i, seen.theta_r, seen.dphi)
     values = radiance(scene.brdf(), flat, *angles, _acceptance(scene), _rings(scene))
+    values *= beam_profile(flat, seen.theta_i, seen.dphi, simulation.lamp_defects)
+    values += wall_radiance(scene.brdf(), seen.theta_r, simulation.wall_light)
     return values.reshape(points_mm.shape[:-1])
 
 
@@ -112,13 +128,13 @@ def _rings(scene: Scene) -> int:
     The largest number that any whole degree within 1 degree of the view angle needs; computed once
     for each place of the lamp.
     """
-    seen_deg = scene.seen_deg()
-    theta_i, dphi = seen_deg["theta_i"], seen_deg["dphi"]
+    seen = scene.in_plane_angles()  # a lean across hardly matters, and would change with theta_r
+    theta_i, dphi = seen.theta_i, seen.dphi
     key = (scene.mounted or "", theta_i, dphi)
     if key not in scene.rings:
         acceptance = _acceptance(scene)
         scene.rings[key] = required_rings(scene.brdf(), theta_i, _VIEW_ANGLES_DEG, dphi, acceptance)
-    near = np.abs(_VIEW_ANGLES_DEG - seen_deg["theta_r"]) <= 1.0
+    near = np.abs(_VIEW_ANGLES_DEG - seen.theta_r) <= 1.0
     return int(scene.rings[key][near].max(initial=1))
 
 
@@ -147,7 +163,10 @@ def _texture(scene: Scene, projection: _Projection) -> FloatImage:
 
 
 @lru_cache(maxsize=4)
-def _response(pinhole: Pinhole, white_electrons_per_s: float) -> FloatImage:
+def _response(pinhole: Pinhole, white_electrons_per_s: float, lens: LensDefects) -> FloatImage:
     """Electrons per second per unit radiance: white at normal incidence is 1/pi; times cos^4."""
     rows, columns = np.ogrid[: pinhole.height_px, : pinhole.width_px]
-    return (np.pi * white_electrons_per_s * pinhole.cos4(columns, rows)).astype(np.float32)
+    falloff = pinhole.cos4(columns, rows)
+    if lens.vignetting:
+        falloff *= transmission((pinhole.height_px, pinhole.width_px), lens)
+    return (np.pi * white_electrons_per_s * falloff).astype(np.float32)

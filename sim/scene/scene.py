@@ -20,9 +20,20 @@ from analysis.models import MODELS
 from instrument.clock import Clock
 from instrument.config.protocol import PatchConfig, Protocol, Sample, SimulatedSample, WhiteTile
 from instrument.config.rig import Rig
+from instrument.config.simulated.defects import Placement
 from instrument.devices import Surface
-from instrument.geometry import Brdf, FloatArray, IntArray, lamp_direction
+from instrument.geometry import Brdf, FloatArray, IntArray
 from sim.clock import SimulatedClock
+from sim.defects.drawn_bench import drawn_bench
+from sim.defects.lamp import warm_up_level
+from sim.defects.mechanics import (
+    SeenAngles,
+    axis_error_deg,
+    leaning,
+    leaning_across,
+    picture_shift,
+    placement,
+)
 from sim.defects.tile import radiance_factor
 from sim.defects.world import SOUND, World
 
@@ -64,10 +75,12 @@ class Scene:
     _lamp_start_s: float = 0.0
 
     def __post_init__(self) -> None:
+        self.rig = drawn_bench(self.rig)
         tile_mm = self.rig.u_placement_mm * self.random(stream_key("tile height")).standard_normal()
+        simulation = self.rig.simulation
         self.heights_mm = {
-            "sample": self.rig.simulation.sample_height_mm,
-            "white tile": float(tile_mm),
+            "sample": simulation.sample_height_mm,
+            "white tile": float(tile_mm) + simulation.tile_height_mm,
         }
 
     @classmethod
@@ -114,7 +127,9 @@ class Scene:
         u_deg = self.rig.axes[axis].u_deg
         key = round(angle_deg * 1e4) % 2**32
         error_deg = u_deg * self.random(stream_key(axis), key).standard_normal()
-        self.true_deg[axis] = float(angle_deg + error_deg)
+        phase = float(self.random(stream_key(f"cycle of {axis}")).random())
+        lasting_deg = axis_error_deg(angle_deg, self.rig.simulation.axis_defects[axis], phase)
+        self.true_deg[axis] = float(angle_deg + error_deg + lasting_deg)
 
     @property
     def mounted(self) -> Surface | None:
@@ -123,11 +138,36 @@ class Scene:
             return None
         return self.surface if self.world.mounted == "as asked" else self.world.mounted
 
-    def seen_deg(self) -> dict[str, float]:
-        """Return the true angles of the axes from the normal of the surface, with all faults."""
+    @property
+    def placement(self) -> Placement:
+        """Place of the mounted surface on the table, without the faults of the moment."""
+        simulation = self.rig.simulation
+        tile = self.mounted == "white tile"
+        return simulation.tile_placement if tile else simulation.sample_placement
+
+    def placement_matrix(self) -> FloatArray:
+        """Return the matrix (3, 3) from points (x, y, 1), in mm, of the surface to the table."""
+        own = self.placement
+        return placement(own.shift_x_mm, own.shift_y_mm, own.turn_deg) @ self.world.placement()
+
+    def picture_shift(self) -> FloatArray:
+        """Return the matrix (3, 3) by which the camera's beam moves pixels (column, row, 1)."""
+        phase = float(self.random(stream_key("wobble of theta_r")).random())
+        beam = self.rig.simulation.axis_defects.theta_r
+        return picture_shift(self.table_angles().theta_r, beam, phase)
+
+    def table_angles(self) -> SeenAngles:
+        """Return the true angles of the axes, with all faults."""
         true_deg = {**_UNSET_DEG, **self.true_deg}
-        own = {name: a + getattr(self.world, f"{name}_deg") for name, a in true_deg.items()}
-        return own if not self.world.tilt_deg else _tilted(own, self.world.tilt_deg)
+        return SeenAngles(**{n: a + getattr(self.world, f"{n}_deg") for n, a in true_deg.items()})
+
+    def in_plane_angles(self) -> SeenAngles:
+        """Return the angles from the normal of the surface, as far as it leans in x."""
+        return leaning(self.table_angles(), self.world.tilt_deg + self.placement.tilt_deg)
+
+    def seen_angles(self) -> SeenAngles:
+        """Return the angles from the normal of the surface."""
+        return leaning_across(self.in_plane_angles(), self.placement.tilt_across_deg)
 
     def brdf(self) -> Brdf:
         """Return the BRDF of the mounted surface.
@@ -161,10 +201,15 @@ class Scene:
         error = tile.u_reflectance * self.random(stream_key("white tile")).standard_normal()
         return float(min(1.0, tile.reflectance + error))
 
+    def age_s(self) -> float:
+        """Return the time since the start of the scan, in seconds, without interruptions."""
+        return self.clock.now_s() - self._lamp_start_s
+
     def lamp_level(self) -> float:
-        """Return the lamp's output now, relative to the start of the scan."""
-        age_s = self.clock.now_s() - self._lamp_start_s
-        return 1.0 + self.rig.simulation.lamp_drift_per_hour * age_s / 3600.0
+        """Return the lamp's output now, relative to a warm lamp at the start of the scan."""
+        simulation, age_s = self.rig.simulation, self.age_s()
+        steady = 1.0 + simulation.lamp_drift_per_hour * age_s / 3600.0
+        return steady * warm_up_level(age_s, simulation.lamp_defects)
 
     def mottling(self) -> tuple[FloatArray, float]:
         """Return the sample's relative albedo variation (rows, columns), mean 0, and its spacing.
@@ -188,15 +233,3 @@ class Scene:
         smooth -= smooth.mean()
         texture: FloatArray = smooth * (self.sample.mottling / smooth.std())
         return texture
-
-
-def _tilted(angles_deg: dict[str, float], tilt_deg: float) -> dict[str, float]:
-    """Return the angles from a normal that leans by `tilt_deg` to the side of positive theta_r."""
-    x, y, z = lamp_direction(angles_deg["theta_i"], angles_deg["dphi"])
-    tilt = np.radians(tilt_deg)
-    across, up = x * np.cos(tilt) - z * np.sin(tilt), x * np.sin(tilt) + z * np.cos(tilt)
-    return {
-        "theta_i": float(np.degrees(np.arctan2(np.hypot(across, y), up))),
-        "dphi": float(np.degrees(np.arctan2(abs(y), across))),
-        "theta_r": angles_deg["theta_r"] - tilt_deg,
-    }

@@ -9,6 +9,7 @@ from instrument.config.camera import CameraConfig
 from instrument.devices import Image
 from sim.defects.camera import (
     bent,
+    dark_current_factor,
     hot_electrons_per_s,
     is_bent,
     unequal_darks_electrons,
@@ -41,13 +42,14 @@ class Sensor:
         self._frame_number = 0
         shape = (self._settings.height_px, self._settings.width_px)
         self._defects = defects = scene.rig.simulation.camera_defects
-        self._hot = hot_electrons_per_s(shape, defects)
-        prnu, dsnu = (scene.random(stream_key(name)) for name in ("PRNU", "DSNU"))
+        names = ("PRNU", "DSNU", "hot pixels")
+        prnu, dsnu, hot = (scene.random(stream_key(name)) for name in names)
+        self._hot = hot_electrons_per_s(shape, defects, hot)
         self._responses = unequal_responses(shape, defects, prnu)
         self._darks_electrons = unequal_darks_electrons(shape, defects, dsnu)
         self._light_state: _SceneState = ()
         self._light = self._no_light = np.zeros(shape, np.float32)
-        self._expected_key: tuple[_SceneState, float, float] = ((), 0.0, 0.0)
+        self._expected_key: tuple[_SceneState, float, float, float] = ((), 0.0, 0.0, 0.0)
         self._expected = (self._light, self._light)
         self._noise = np.empty(shape, np.float32)
         self._counts = np.empty(shape, np.uint16)
@@ -82,10 +84,11 @@ class Sensor:
         scene = self.scene
         level = round(scene.lamp_level(), 6) * scene.world.light(scene.lit) * self._flicker()
         state = (scene.surface, *sorted(scene.true_deg.items()), scene.world)
-        key = (state, exposure_s, level)
+        warmth = round(dark_current_factor(scene.age_s(), self._defects), 4)
+        key = (state, exposure_s, level, warmth)
         if key != self._expected_key:
             light = self._light_of(state) if level else self._no_light
-            self._expected = self._expected_dn(light, level, exposure_s)
+            self._expected = self._expected_dn(light, level, exposure_s, warmth)
             self._expected_key = key
         return self._expected
 
@@ -96,19 +99,19 @@ class Sensor:
         return self._light
 
     def _expected_dn(
-        self, light: FloatImage, level: float, exposure_s: float
+        self, light: FloatImage, level: float, exposure_s: float, warmth: float
     ) -> tuple[FloatImage, FloatImage]:
         s = self._settings
         electrons = light * np.float32(level * exposure_s)
         if self._responses is not None:
             electrons *= self._responses
-        electrons += np.float32(s.dark_current_electrons_per_s * exposure_s)
+        electrons += np.float32(s.dark_current_electrons_per_s * exposure_s * warmth)
         if self.scene.world is not SOUND:
             white = self.scene.rig.lamp.white_electrons_per_s
             stray = stray_electrons_per_s(self.scene.world, s, white)
             electrons += stray * np.float32(exposure_s)
         if self._hot is not None:
-            electrons += (self._hot * exposure_s).astype(np.float32)
+            electrons += (self._hot * (exposure_s * warmth)).astype(np.float32)
         np.minimum(electrons, np.float32(s.full_well_electrons), out=electrons)
         spread = np.sqrt(electrons + np.float32(s.read_noise_electrons**2))
         if self._darks_electrons is not None:
@@ -122,7 +125,8 @@ class Sensor:
 
     def _flicker(self) -> float:
         """Return the factor of the lamp's light in this frame."""
-        sigma = self.scene.world.flicker
+        lamp = self.scene.rig.simulation.lamp_defects
+        sigma = float(np.hypot(self.scene.world.flicker, lamp.flicker))
         if not sigma:
             return 1.0
         random = self.scene.random(stream_key("flicker"), *self._series[1:], self._frame_number)

@@ -13,10 +13,12 @@ from instrument.config.camera import CameraDefects
 from sim.clock import SimulatedClock
 from sim.defects.camera import (
     bent,
+    dark_current_factor,
     hot_electrons_per_s,
     limit_range,
     read_back_s,
     true_exposure_s,
+    unequal_responses,
 )
 from sim.scene.camera import SimulatedCamera
 from tests.support.scans import changed, simulated_scene, small_scan
@@ -67,7 +69,7 @@ def test_a_hot_pixel_of_the_simulated_camera() -> None:
     extra = image[7, 9] - np.median(image)
     assert extra == pytest.approx(10_000 / small.rig.camera.electrons_per_dn, rel=0.05)
     assert np.sum(image > np.median(image) + 100) == 1
-    assert hot_electrons_per_s((8, 8), CameraDefects()) is None
+    assert hot_electrons_per_s((8, 8), CameraDefects(), np.random.default_rng()) is None
 
 
 def pictures(defects: dict[str, Any], count: int = 24, *, lit: bool = True) -> Any:
@@ -118,3 +120,56 @@ def test_unequal_pixels_of_the_simulated_camera() -> None:
     dark = pictures({"dsnu_electrons": 30.0}, lit=False)
     assert np.std(dark) == pytest.approx(30.0, rel=0.1)
     assert np.std(pictures({"prnu": 0.05}, lit=False)) < 4.0
+
+
+def test_dead_pixels_see_no_light_and_drawn_ones_have_their_share() -> None:
+    dead = [{"row": 50, "column": 60}, {"row": 51, "column": 70}]
+    seen = pictures({"dead_pixels": dead})
+    assert seen[50, 60] == pytest.approx(0.0, abs=10.0)
+    assert seen[51, 70] == pytest.approx(0.0, abs=10.0)
+    assert seen[50, 61] > 1000
+    random = np.random.default_rng(1)
+    responses = unequal_responses((400, 400), CameraDefects(dead_share=0.01), random)
+    assert responses is not None
+    assert np.mean(responses == 0) == pytest.approx(0.01, rel=0.1)
+    assert set(np.unique(responses)) == {0.0, 1.0}
+    assert unequal_responses((8, 8), CameraDefects(), random) is None
+
+
+def test_drawn_hot_pixels_have_their_share_and_mean() -> None:
+    defects = CameraDefects(hot_share=0.02, hot_electrons_per_s=500.0)
+    current = hot_electrons_per_s((400, 400), defects, np.random.default_rng(2))
+    assert current is not None
+    assert np.mean(current > 0) == pytest.approx(0.02, rel=0.1)
+    assert current[current > 0].mean() == pytest.approx(500.0, rel=0.1)
+
+
+def test_dark_current_doubles_with_the_temperature() -> None:
+    warm = CameraDefects(warming_k=14.0, warming_s=100.0, doubling_k=7.0)
+    assert dark_current_factor(0.0, warm) == 1.0
+    assert dark_current_factor(1e6, warm) == pytest.approx(4.0)
+    assert dark_current_factor(100 * np.log(2), warm) == pytest.approx(2.0)
+    assert dark_current_factor(100.0, CameraDefects()) == 1.0
+
+
+def test_a_warm_camera_is_darker_at_the_start_than_later() -> None:
+    """Noise apart: the dark current of all pixels, and that of hot ones."""
+    small = small_scan()
+    hot = {"row": 7, "column": 9, "electrons_per_s": 2e4}
+    warming = {"warming_k": 7.0, "warming_s": 600.0, "doubling_k": 7.0, "hot_pixels": [hot]}
+    own = CameraDefects.model_validate(warming)
+    simulation = small.rig.simulation.model_copy(update={"camera_defects": own})
+    camera = small.rig.camera.model_copy(update={"dark_current_electrons_per_s": 2000.0})
+    scene = simulated_scene(changed(small, rig={"simulation": simulation, "camera": camera}))
+    scene.lit = False
+    clock = SimulatedClock()
+    scene.use_clock(clock)
+    sensor = SimulatedCamera(scene, clock)
+    sensor.set_exposure_s(0.5)
+    early, late = [], []
+    for pictures_, age_s in ((early, 0.0), (late, 1e5)):
+        scene.begin_step(0, age_s)
+        pictures_ += [f.image.astype(float) - camera.black_level_dn for f in sensor.grab(16)]
+    ratio = np.mean(late, axis=0) / np.mean(early, axis=0)
+    assert np.median(ratio) == pytest.approx(2.0, rel=0.01)
+    assert ratio[7, 9] == pytest.approx(2.0, rel=0.01)

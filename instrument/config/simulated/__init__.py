@@ -1,0 +1,1 @@
+"""Defects of a simulated rig, as its file gives them; open `defects` first."""
