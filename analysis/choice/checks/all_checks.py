@@ -10,7 +10,7 @@ from __future__ import annotations
 from analysis.choice.adequacy import Agreement
 from analysis.choice.candidates import Candidates
 from analysis.choice.checks.angle_units import angle_unit_text
-from analysis.choice.checks.mistakes import suspected_mistake
+from analysis.choice.checks.mistakes import cosines_in_minnaert, suspected_mistake
 from analysis.choice.checks.outliers import outliers
 from analysis.choice.checks.reciprocity import reciprocity
 from analysis.choice.checks.reflectance import reflectance_above_one
@@ -27,6 +27,9 @@ def check_notes(
 ) -> tuple[Note, ...]:
     """Notes on the measurements behind a chosen fit, judged by its agreement with them."""
     found = free_check_notes(tried.fits.measurements)
+    cosines = cosines_in_minnaert(chosen, tried.fits.measurements) if judged.agrees else ""
+    if cosines:
+        return (*found, Note(NoteCode.COSINE_FACTOR, cosines))
     if judged.within_u or any(note.code is NoteCode.ANGLE_UNIT for note in found):
         return found
     return found + _explanations(tried, chosen, judged, acceptance)
@@ -52,7 +55,7 @@ def _explanations(
     found: tuple[Note, ...] = ()
     broken = reciprocity(tried.measurements, chosen.brdf)
     if broken is not None:
-        if broken.cosine:
+        if broken.by_cosine:
             return (Note(NoteCode.COSINE_FACTOR, str(broken)),)
         found = (Note(NoteCode.NOT_RECIPROCAL, str(broken)),)
     m = tried.fits.measurements

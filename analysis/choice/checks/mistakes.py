@@ -17,6 +17,7 @@ import numpy as np
 from analysis.choice.notes import NoteCode
 from analysis.data.measurements import Measurements
 from analysis.fit.first_fit import FirstFit, FirstFits, enough_points
+from analysis.fit.fit import FitResult
 from analysis.models import MODELS
 from instrument.geometry import FloatArray
 
@@ -28,6 +29,8 @@ _CLEARLY_BETTER, _MAX_RMS_RELATIVE = 0.5, 0.05
 _AS_GOOD = 1.5  # ratio of misfits up to which another mistake explains the data as well
 _MOST_POINTS = 400  # of the fits; more points make them slower, and not clearer
 _FEWEST_PER_PARAMETER = 2
+# k of Minnaert's law, k = 1 of a matt surface and 2 of one times cosines, from which that is told.
+_COSINES_K = 1.9
 _DARK = 1e-3  # cosine below which a value cannot be divided by it
 
 
@@ -39,8 +42,9 @@ class Suspected(NamedTuple):
 
 
 class _Mistake(NamedTuple):
-    """A mistake: its effect and the remedy in words, and a function that undoes it."""
+    """A mistake: name, effect and remedy in words, and a function that undoes it."""
 
+    name: str
     code: NoteCode
     effect: str
     remedy: str
@@ -48,6 +52,7 @@ class _Mistake(NamedTuple):
 
 
 _SWAPPED = _Mistake(
+    "lamp side",
     NoteCode.LAMP_SIDE,
     "the lamp stood on the other side (the sign of theta_r, or dphi by 180 degrees, is wrong)",
     "turn the sign of theta_r, unless the sample sends light back to the lamp (retro-reflector)",
@@ -57,6 +62,7 @@ _SWAPPED = _Mistake(
 
 def _cosine(name: str, cosine: Callable[[Measurements], FloatArray]) -> _Mistake:
     return _Mistake(
+        name,
         NoteCode.COSINE_FACTOR,
         f"the values are the BRDF times {name}",
         f"divide them by {name}",
@@ -71,6 +77,7 @@ _COS_BOTH = _cosine(
     lambda m: np.cos(m.geometry.theta_i) * np.cos(m.geometry.theta_r),
 )
 _RADIANS = _Mistake(
+    "radians",
     NoteCode.ANGLE_UNIT,
     "the angles are in radians (none is above 1.58)",
     "convert them: angles are read in degrees",
@@ -102,6 +109,17 @@ def suspected_mistake(first: Sequence[FirstFit], m: Measurements) -> Suspected |
     best = found[0][0]
     also = [b for f, b in found[1:] if _misfit(f) <= _AS_GOOD * _misfit(best)]
     return _told(found[0][1], also, before=as_given[1], after=_rms(best))
+
+
+def cosines_in_minnaert(chosen: FitResult, m: Measurements) -> str:
+    """Return that Minnaert's law with k near 2 is a matt surface times cosines; "" for others."""
+    if chosen.model != "minnaert" or chosen.values["k"] < _COSINES_K:
+        return ""
+    name = _COS_R.name if m.free_levels or np.ptp(m.theta_i_deg) < 1.0 else _COS_BOTH.name
+    return (
+        f"minnaert with k = {chosen.values['k']:.3g} is Lambert's law times {name}: the values may "
+        f"be the BRDF times {name}. If so, divide them by {name}"
+    )
 
 
 def _possible(m: Measurements) -> list[_Mistake]:

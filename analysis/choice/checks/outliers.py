@@ -35,9 +35,10 @@ _STAND_OUT = 9.0
 # more than a few times the least, the simplest is taken.
 _QUICK_RTOL, _QUICK_STEPS, _CLOSE = 1e-2, 12, 2.0
 _SIGMA_PER_MEDIAN = 1.4826  # of the absolute values of normal errors
-_CLEARLY_BETTER = 0.75  # misfit without the points, as a fraction of that of the usual fit
+_CLEARLY_BETTER = 0.6  # misfit without the points, as a fraction of that of the usual fit
 # Neighbours off to one side, from this number on, are a part of the reflectance that is missing in
-# the model; so are bright points alone near the mirror direction, in degrees.
+# the model, or an error that grows. So may be bright points alone near the mirror direction (in
+# degrees), and points alone at the ends of sweeps.
 _A_STRETCH, _NEAR_MIRROR_DEG = 3, 5.0
 
 
@@ -84,7 +85,7 @@ def outliers(
     out = _stand_out(robust, m)
     others = m.subset(~out)
     few = others.size < _POINTS_PER_PARAMETER * robust.solution.x.size
-    if few or _missing_lobe(robust, m, out):
+    if few or _systematic(robust, m, out):
         return None
     fitted = refine(
         FirstFits(others).of(robust.model), others, acceptance, robust=False, profiles=False
@@ -159,14 +160,16 @@ def _misfit(result: FitResult) -> float:
     return result.rms_relative if result.chi2 is None else math.sqrt(result.reduced_chi2 or 0.0)
 
 
-def _missing_lobe(fit: FirstFit, m: Measurements, out: BoolArray) -> bool:
-    """True for a stretch of neighbours off to one side, and for bright points at the mirror."""
-    sign = np.sign(_residuals(fit, m)) * out
+def _systematic(fit: FirstFit, m: Measurements, out: BoolArray) -> bool:
+    """True where the points that stand out may belong to a lobe, or to an error that grows."""
+    sign, ends = np.sign(_residuals(fit, m)) * out, np.zeros(m.size, dtype=bool)
     for _, _, points in sweeps(m):
+        ends[points[[0, -1]]] = True
         s = sign[points]
         runs = np.split(s, np.flatnonzero(np.diff(s)) + 1)
         if any(run[0] != 0 and run.size >= _A_STRETCH for run in runs):
             return True
     g = m.geometry
     off = np.hypot(g.theta_i_deg - g.theta_r_deg, g.theta_r_deg * (1 + g.cos_dphi))
-    return bool(np.all((sign[out] > 0) & (off[out] < _NEAR_MIRROR_DEG)))
+    mirror = (sign > 0) & (off < _NEAR_MIRROR_DEG)
+    return bool(np.all((mirror | ends)[out]))

@@ -2,7 +2,8 @@
 
 Every reciprocal pair of an isotropic sample must agree, whatever its reflectance. A break has a
 cause that no reflectance model can describe: an anisotropic or uneven sample, or values that are a
-BRDF times one cosine. The second is recognised by its size in each pair.
+BRDF times one cosine. The second is recognised by its size in each pair; and where one factor of
+each incidence explains all pairs, white tile and lamp are suspect before the sample.
 
 Source: W. C. Snyder, "Reciprocity of the Bidirectional Reflectance Distribution Function (BRDF) in
 Measurements and Models of Structured Surfaces", IEEE Transactions on Geoscience and Remote Sensing
@@ -31,11 +32,17 @@ _FEWEST, _FEWEST_WITHOUT_U = 2, 5  # pairs
 # Standard deviations by which more than half of the pairs must differ, so that a few outliers are
 # no verdict on the sample.
 _BEYOND = 3.0
-# A cosine is the cause where dividing by it leaves no more than this share of the difference.
-_LEFT_BY_COSINE = 1 / 3
+# A cosine, or one factor of each incidence, is the cause where dividing by it leaves no more than
+# this share of the difference. Factors need twice as many pairs, or they would explain anything.
+_LEFT_BY_CAUSE = 1 / 3
+_PAIRS_PER_LEVEL = 2
+_MOST_LEVELS = 8  # that are listed
 # Steps of a sweep, in degrees, whose second differences show noise rather than shape.
 _FINE_STEP_DEG = 10.0
 _SIGMA_PER_MEDIAN = 1.4826  # of the absolute values of normal errors
+
+INCIDENCE = "incidence"
+"""Cause of a break: one factor of each incidence."""
 
 
 class Reciprocity(NamedTuple):
@@ -43,8 +50,10 @@ class Reciprocity(NamedTuple):
 
     median, largest: difference in a pair over its mean value. at_deg: theta_i, theta_r and dphi of
     the largest, in degrees. u: median standard uncertainty of such a difference, None where no u is
-    stated. cosine: "theta_i" or "theta_r" where the values are a BRDF times that cosine, else "".
-    left: median difference that remains when that cosine is divided out.
+    stated. cause: "cos(theta_i)" or "cos(theta_r)" where the values are a BRDF times that cosine,
+    INCIDENCE where one factor of each incidence explains them, else "". left: median difference
+    that remains when the cause is divided out. levels: theta_i in degrees and the factor of each
+    incidence, relative to the first, for that cause.
     """
 
     pairs: int
@@ -52,8 +61,14 @@ class Reciprocity(NamedTuple):
     largest: float
     at_deg: tuple[float, float, float]
     u: float | None
-    cosine: str
+    cause: str
     left: float
+    levels: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def by_cosine(self) -> bool:
+        """True if the values are a BRDF times one cosine."""
+        return self.cause not in ("", INCIDENCE)
 
     def __str__(self) -> str:
         u = "no u stated" if self.u is None else f"u {100 * self.u:.2g} %"
@@ -64,15 +79,27 @@ class Reciprocity(NamedTuple):
             f"{100 * self.largest:.2g} %, at theta_i {theta_i:.4g}, theta_r {theta_r:.4g}, dphi "
             f"{dphi:.4g} degrees)"
         )
-        if self.cosine:
+        if self.by_cosine:
             return (
-                f"{seen}, but by {100 * self.left:.2g} % once divided by cos({self.cosine}): the "
-                f"values seem to be the BRDF times cos({self.cosine}); if they are, divide by it"
+                f"{seen}, but by {100 * self.left:.2g} % once divided by {self.cause}: the values "
+                f"seem to be the BRDF times {self.cause}; if they are, divide by it"
             )
+        return f"{seen}. No model of a flat isotropic sample can fit: {self._remedy}"
+
+    @property
+    def _remedy(self) -> str:
+        sample = (
+            "the sample is probably anisotropic (grain, weave, brushing) or not flat; turn it by "
+            "90 degrees in its plane, measure again and compare"
+        )
+        if self.cause != INCIDENCE:
+            return sample
+        shown = self.levels[:_MOST_LEVELS]
+        factors = ", ".join(f"{factor:.4g} at {theta_i:g}" for theta_i, factor in shown)
         return (
-            f"{seen}. No model of a flat isotropic sample can fit: the sample is probably "
-            "anisotropic (grain, weave, brushing) or not flat; turn it by 90 degrees in its plane, "
-            "measure again and compare"
+            f"one factor of each incidence would explain it ({factors} degrees; left: "
+            f"{100 * self.left:.2g} %), such as of a white tile that is not matt, a lamp that "
+            f"changed, or a tilt of the sample. If these are in order, {sample}"
         )
 
 
@@ -96,8 +123,8 @@ def reciprocity(m: Measurements, smooth: Brdf) -> Reciprocity | None:
     k = low[worst]
     at = float(m.theta_i_deg[k]), float(m.theta_r_deg[k]), float(m.dphi_deg[k])
     u = None if C is None else float(np.median(C.u_total / np.abs(mean)))
-    cosine, left = _cosine(m, low, high)
-    return Reciprocity(low.size, median, float(relative[worst]), at, u, cosine, left)
+    cause = _cause(m, low, high)
+    return Reciprocity(low.size, median, float(relative[worst]), at, u, *cause)
 
 
 def reciprocal_pairs(m: Measurements) -> tuple[IntArray, IntArray]:
@@ -162,18 +189,42 @@ def _scatter(m: Measurements) -> float:
     return _SIGMA_PER_MEDIAN * float(np.median(bends)) / np.sqrt(1.5) if bends.size else 0.0
 
 
-def _cosine(m: Measurements, low: IntArray, high: IntArray) -> tuple[str, float]:
-    """Angle whose cosine explains the differences, and the median difference that it leaves."""
+def _cause(
+    m: Measurements, low: IntArray, high: IntArray
+) -> tuple[str, float, tuple[tuple[float, float], ...]]:
+    """Cause that explains the differences, the median one that it leaves, and its levels."""
     lit = (m.brdf[low] > 0) & (m.brdf[high] > 0)
+    if 2 * np.count_nonzero(lit) < lit.size:
+        return "", 0.0, ()
     low, high = low[lit], high[lit]
-    if 2 * low.size < lit.size or not low.size:
-        return "", 0.0
-    cos = np.maximum(np.cos(m.geometry.theta_i[low]), 1e-6)
     ratio = np.log(m.brdf[low] / m.brdf[high])
-    expected = np.log(cos / np.maximum(np.cos(m.geometry.theta_i[high]), 1e-6))
-    most = _LEFT_BY_COSINE * float(np.median(np.abs(ratio)))
-    for name, sign in (("theta_i", 1.0), ("theta_r", -1.0)):
-        left = float(np.median(np.abs(ratio - sign * expected)))
+    cos = np.maximum(np.cos(m.geometry.theta_i), np.finfo(float).tiny)
+    expected = np.log(cos[low] / cos[high])
+    rests = {"cos(theta_i)": ratio - expected, "cos(theta_r)": ratio + expected}
+    levels, rests[INCIDENCE] = _levels(m, low, high, ratio)
+    most = _LEFT_BY_CAUSE * float(np.median(np.abs(ratio)))
+    for name, rest in rests.items():
+        left = float(np.median(np.abs(rest)))
         if left <= most:
-            return name, left
-    return "", 0.0
+            return name, left, levels if name == INCIDENCE else ()
+    return "", 0.0, ()
+
+
+def _levels(
+    m: Measurements, low: IntArray, high: IntArray, ratio: FloatArray
+) -> tuple[tuple[tuple[float, float], ...], FloatArray]:
+    """Factor of each incidence, and the logarithmic ratios (P,) that they leave.
+
+    No factors, and the whole ratios, where the pairs are too few for them.
+    """
+    ends = np.round(np.concatenate([m.theta_i_deg[low], m.theta_i_deg[high]]))
+    incidences, member = np.unique(ends, return_inverse=True)
+    if low.size < _PAIRS_PER_LEVEL * (incidences.size - 1):
+        return (), ratio
+    pairs, design = np.arange(low.size), np.zeros((low.size, incidences.size))
+    design[pairs, member[: low.size]] = 1.0
+    design[pairs, member[low.size :]] -= 1.0
+    best, *_ = np.linalg.lstsq(design, ratio, rcond=None)
+    factors = np.exp(best - best[0])
+    levels = tuple(zip(incidences.tolist(), factors.tolist(), strict=True))
+    return levels, np.asarray(ratio - design @ best)

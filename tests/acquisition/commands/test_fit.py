@@ -263,6 +263,20 @@ def test_what_a_table_does_not_state_is_named_as_assumed(rough: Path) -> None:
     assert stated["u_shared"] == "all values share an error of 0.5 % (--u-shared)"
 
 
+def test_a_suspicion_about_the_table_is_printed_and_stands_in_the_json(
+    rough: Path, tmp_path: Path
+) -> None:
+    """The lamp on the other side: theta_r with the wrong sign."""
+    rows = [line.split(",") for line in rough.read_text().splitlines()]
+    turned = [[i, str(-float(r)), *rest] for i, r, *rest in rows[1:]]
+    path = tmp_path / "swapped.csv"
+    path.write_text(HEADER + "".join(",".join(row) + "\n" for row in turned))
+    options = ("--models", "lambert,oren_nayar")
+    text = notes(gonio("fit", path, *options, "--json"))["lamp_side"]
+    assert "the sign of theta_r" in text
+    assert text in " ".join(gonio("fit", path, *options).stdout.split())
+
+
 @pytest.mark.parametrize("with_u", [True, False], ids=["u_brdf", "no u"])
 @pytest.mark.parametrize("u_shared", ["2%", "0.02", " 2 % "])
 def test_a_u_that_all_values_share_widens_that_of_the_albedo(

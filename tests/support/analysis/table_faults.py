@@ -75,6 +75,18 @@ def lamp_swapped(m: Measurements) -> Measurements:
     return replace(m, theta_r_deg=-m.theta_r_deg)
 
 
+def bench_errors(m: Measurements, seed: int) -> Measurements:
+    """Systematic errors of a bench, smooth in the angles: up to a few %, and glare up to 1 %."""
+    rng = np.random.default_rng((8, seed))
+    x, z = np.sin(np.radians(m.theta_r_deg)), np.cos(m.geometry.theta_i)
+    size = 0.03 * 10 ** rng.uniform(-1, 0)
+    error = size * (rng.standard_normal(4) @ np.stack([x, x * x, x * z, z]))
+    glare = (
+        rng.uniform(0, 0.01) * float(np.mean(m.brdf)) / np.maximum(np.cos(m.geometry.theta_r), 0.1)
+    )
+    return replace(m, brdf=m.brdf * (1 + error) + glare)
+
+
 def in_radians(m: Measurements, decimals: int = 4) -> Measurements:
     """All angles in radians, rounded to so many decimals."""
     angles = (m.theta_i_deg, m.theta_r_deg, m.dphi_deg)

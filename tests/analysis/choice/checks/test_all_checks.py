@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -62,6 +63,22 @@ def test_each_mistake_is_told_once(stated: bool) -> None:
         found = choose(wrong, models=FEW)
         assert told(found) == [code]
         assert str(code) in [note["code"] for note in to_json(found)["notes"]]
+
+
+@pytest.mark.parametrize("incidences", [1, 2])
+def test_a_lambertian_sample_times_cosines_is_not_taken_for_minnaerts(incidences: int) -> None:
+    """Minnaert's law with k = 2 explains the values, so the misfit tells nothing."""
+    m = matt_table(2, incidences=incidences).measurements
+    noise = m.brdf / matt_table(2, incidences=incidences).brdf(m.geometry)
+    cosines = np.cos(m.geometry.theta_i) * np.cos(m.geometry.theta_r)
+    u = 0.003 * 0.2 * cosines
+    wrong = replace(m, brdf=0.2 * noise * cosines, u_random=u)
+    found = choose(wrong, models=["lambert", "minnaert"])
+    assert (found.chosen, found.verdict) == ("minnaert", "adequate")
+    (note,) = [note for note in found.notes if note.code in CHECKS]
+    assert note.code is NoteCode.COSINE_FACTOR
+    name = "cos(theta_r)" if incidences == 1 else "cos(theta_i) cos(theta_r)"
+    assert f"Lambert's law times {name}:" in note.text
 
 
 def test_a_robust_fit_suggests_no_robust_fit() -> None:
