@@ -112,7 +112,7 @@ def _radiance_at(scene: Scene, points_mm: FloatArray) -> FloatArray:
     height = np.full(points_mm.shape[:-1], scene.heights_mm[scene.mounted or "sample"])
     flat = np.dstack([points_mm, height]).reshape(-1, 3)
     angles = (seen.theta_i, seen.theta_r, seen.dphi)
-    values = radiance(scene.brdf(), flat, *angles, _acceptance(scene), _rings(scene))
+    values = radiance(scene.seen_brdf(), flat, *angles, _acceptance(scene), _rings(scene))
     values *= beam_profile(flat, seen.theta_i, seen.dphi, simulation.lamp_defects)
     values += wall_radiance(scene.brdf(), seen.theta_r, simulation.wall_light)
     return values.reshape(points_mm.shape[:-1])

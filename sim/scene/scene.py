@@ -34,6 +34,7 @@ from sim.defects.mechanics import (
     picture_shift,
     placement,
 )
+from sim.defects.polarisation import polarised
 from sim.defects.tile import radiance_factor
 from sim.defects.world import SOUND, World
 
@@ -169,8 +170,19 @@ class Scene:
         """Return the angles from the normal of the surface."""
         return leaning_across(self.in_plane_angles(), self.placement.tilt_across_deg)
 
+    def seen_brdf(self) -> Brdf:
+        """Return the BRDF as the polarisation of lamp and camera show it.
+
+        Of geometries of any shape, in 1/sr, as in `brdf`.
+        """
+        if self.mounted != "sample":
+            return self.brdf()
+        simulation = self.rig.simulation
+        lamp, lens = simulation.lamp_defects.polarisation, simulation.lens_defects.polarisation
+        return polarised(self.brdf(), self.sample, self.seen_angles(), lamp=lamp, camera=lens)
+
     def brdf(self) -> Brdf:
-        """Return the BRDF of the mounted surface.
+        """Return the BRDF of the mounted surface, for natural light.
 
         The function takes a `Geometry` of any shape and returns an array of that shape in 1/sr.
         """

@@ -20,7 +20,8 @@ class LampDefects(Section):
     constant `warm_up_s`. `flicker`: relative standard deviation of the light from frame to frame.
     `spot_fwhm_mm`: full width at half maximum of the beam at the sample, which is Gaussian; it is
     even if omitted. `aim_x_mm`, `aim_y_mm`: distance of the beam from the rotation axis, across
-    the beam, in and out of the plane of incidence.
+    the beam, in and out of the plane of incidence. `polarisation`: relative excess of light that
+    vibrates across the plane of the sample's normal and of the lamp.
     """
 
     warm_up: Share = 0.0
@@ -29,6 +30,7 @@ class LampDefects(Section):
     spot_fwhm_mm: Positive | None = None
     aim_x_mm: Signed = 0.0
     aim_y_mm: Signed = 0.0
+    polarisation: Annotated[float, Field(ge=-1, le=1), Spread.SIGNED] = 0.0
 
 
 class LensDefects(Section):
@@ -40,7 +42,8 @@ class LensDefects(Section):
     point at the same distance, to the outside if positive (pincushion) and to the inside if
     negative (barrel). `defocus_px`: standard deviation of the picture of a point. `glare`: share
     of the light that is scattered; half of it falls within sqrt(3) `glare_width` times the
-    picture's width.
+    picture's width. `polarisation`: relative excess of the camera's response to light that vibrates
+    along its columns, across the plane in which it swings.
     """
 
     axis_column_px: Signed = 0.0
@@ -50,6 +53,7 @@ class LensDefects(Section):
     defocus_px: Size = 0.0
     glare: Share = 0.0
     glare_width: Annotated[float, Field(ge=0.02, le=2)] = 0.15
+    polarisation: Annotated[float, Field(ge=-1, le=1), Spread.SIGNED] = 0.0
 
 
 class Placement(Section):

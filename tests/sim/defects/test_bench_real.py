@@ -27,7 +27,9 @@ from tests.support.scans import changed, simulated_scene, small_scan, undated
 from tests.support.whole_scans.stopped_scan import scan
 
 SMALL = small_scan("bench_real")
-MATT = SimulatedSample(model="lambert", parameters={"albedo": 0.5})
+GLOSSY = SimulatedSample(
+    model="lambert+torrance_sparrow", parameters={"albedo": 0.5, "ks": 0.1, "sigma_deg": 20.0}
+)
 POSE = {"theta_i": 60.0, "dphi": 30.0, "theta_r": 40.0}
 
 
@@ -51,7 +53,7 @@ def without(path: tuple[str, ...]) -> Simulation:
 
 def pictures(simulation: Simulation, before: tuple[str, ...] = ()) -> list[Image]:
     """Frames of the sample, of the tile and in the dark, an hour after `before` was looked at."""
-    loaded = changed(SMALL, rig={"simulation": simulation}, simulated_sample=MATT)
+    loaded = changed(SMALL, rig={"simulation": simulation}, simulated_sample=GLOSSY)
     scene, clock = simulated_scene(loaded), SimulatedClock()
     scene.use_clock(clock)
     camera = SimulatedCamera(scene, clock)
@@ -100,7 +102,7 @@ def test_a_scan_of_a_drawn_bench_may_be_resumed(tmp_path: Path) -> None:
     cold = {**SMALL.rig.simulation.camera_defects.model_dump(), "warming_k": 0.0}
     drawn = {"drawn": True, "seed": 7, "camera_defects": cold}
     own = Simulation.model_validate({**SMALL.rig.simulation.model_dump(), **drawn})
-    loaded = changed(SMALL, rig={"simulation": own}, simulated_sample=MATT)
+    loaded = changed(SMALL, rig={"simulation": own}, simulated_sample=GLOSSY)
     with Record.create(tmp_path / "whole", {}) as record:
         scan(loaded, record)
         whole = record.readings()
