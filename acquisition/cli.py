@@ -5,47 +5,35 @@ Each command imports its module when it is called, so that `gonio --help` loads 
 
 from __future__ import annotations
 
-import errno
 import gc
 import os
 import platform
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated
 
 import typer
-from typer.core import TyperGroup
 
+from acquisition.calibrate_cli import calibrate
+from acquisition.cli_parts import Commands, Json, RigOnly
 from acquisition.terminal import stop_signals
 from acquisition.terminal.streams import lasting_streams
-from instrument.errors import GonioError, InputError, OperatorStop, StorageError
-from instrument.text.terminal_safe import escape_control_characters
+from instrument.errors import StorageError
 
 # The program's arrays are small: several threads in linear algebra would only cost time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
-class _Commands(TyperGroup):
-    """Group whose commands end with an exit code of the program where they fail."""
-
-    def invoke(self, ctx: Any) -> Any:
-        """Run a command."""
-        with errors_as_exit_codes():
-            return super().invoke(ctx)
-
-
 app = typer.Typer(
-    cls=_Commands,
+    cls=Commands,
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+app.add_typer(calibrate, name="calibrate")
 
-_SHOWN = 80  # characters of a path that is too long
-_MORE = "free memory, raise the limit (ulimit -v), or name less data; what is recorded stays"
 _AXES = ("theta_i", "dphi", "theta_r")
 
 
@@ -72,11 +60,6 @@ OutFolder = Annotated[
         "--out", help="Folder for the run, absent or empty. Default: runs/NAME-DATE-TIME."
     ),
 ]
-Json = Annotated[
-    bool, typer.Option("--json", help="Print only the result, as JSON, on standard output.")
-]
-
-RigOnly = Annotated[Path | None, typer.Option("--rig", help="The rig file.")]
 Yes = Annotated[bool, typer.Option("--yes", help="The rig is clear and may move: do not ask.")]
 AxisName = Annotated[
     str,
@@ -289,39 +272,6 @@ def grab(
     grab_frame(out, rig, protocol, theta_r_deg=theta_r_deg, exposure_s=exposure_s, as_json=json)
 
 
-calibrate = typer.Typer(
-    cls=_Commands,
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    help="Measure a rig's devices and write what was found to a file.",
-)
-app.add_typer(calibrate, name="calibrate")
-
-
-@calibrate.command()
-def camera(
-    rig: RigOnly = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File for the calibration, new, .npz.")
-    ] = None,
-    plan: Annotated[
-        bool, typer.Option("--plan", help="Show what would be measured; opens no device.")
-    ] = False,
-    exposures: Annotated[int, typer.Option(help="Number of exposures with the lamp lit.")] = 30,
-    frames: Annotated[int, typer.Option(help="Frames at each exposure.")] = 4,
-    json: Json = False,
-) -> None:
-    """Calibrate the camera: darks, gain and noise, linearity, hot pixels, flat field.
-
-    The operator places a matt white surface that fills the picture, and covers a lamp that has no
-    shutter. Nothing moves. Names and definitions are those of EMVA 1288, release 4.0. Exits with 5
-    if the frames do not determine the camera.
-    """
-    from acquisition.commands.calibrate import calibrate_camera
-
-    calibrate_camera(rig, out, exposures=exposures, frames=frames, plan_only=plan, as_json=json)
-
-
 @app.command()
 def bench(
     out: Annotated[Path, typer.Option("--out", help="Folder for the results, absent or empty.")],
@@ -350,43 +300,3 @@ def main() -> None:
     except StorageError as error:  # of the help, and of the last flush
         sys.stderr.write(f"{error}\n")
         sys.exit(error.exit_code)
-
-
-@contextmanager
-def errors_as_exit_codes() -> Iterator[None]:
-    """Print an expected error or a Ctrl-C on standard error and exit with its code."""
-    try:
-        yield
-    except GonioError as error:
-        _exit(str(error), error.exit_code)
-    except OSError as error:
-        if error.errno == errno.ENAMETOOLONG:
-            _exit(_too_long(error), InputError.exit_code)
-        _exit(str(error), StorageError.exit_code)
-    except (MemoryError, ImportError, RuntimeError) as error:
-        if not _is_memory(error):
-            raise
-        _exit(f"out of memory ({str(error) or 'no details'}): {_MORE}", StorageError.exit_code)
-    except KeyboardInterrupt as stop:
-        _exit(str(stop) or "stopped by the operator", OperatorStop.exit_code)
-
-
-def _is_memory(error: Exception) -> bool:
-    """Return True for an error of too little memory: of data, a library or a thread."""
-    words = ("failed to map segment", "cannot allocate memory", "can't start new thread")
-    return isinstance(error, MemoryError) or any(w in str(error).lower() for w in words)
-
-
-def _too_long(error: OSError) -> str:
-    """Return the message for a path that no file system takes, which is shown only in part."""
-    path = os.fspath(error.filename) if error.filename is not None else ""
-    name = path if isinstance(path, str) else os.fsdecode(path)
-    return (
-        f"{name[:_SHOWN]}...: too long ({len(os.fsencode(name))} bytes); allowed: names of up to "
-        "255 bytes, together up to 4095: use a shorter one"
-    )
-
-
-def _exit(message: str, code: int) -> NoReturn:
-    sys.stderr.write(f"{escape_control_characters(message)}\n")
-    raise typer.Exit(code) from None

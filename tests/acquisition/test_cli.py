@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from acquisition.cli import errors_as_exit_codes
+from acquisition.cli_parts import errors_as_exit_codes
 from instrument.errors import DeviceError, InputError, NotDetermined, OperatorStop, StorageError
 from tests.support.command import gonio_here as gonio
 from tests.support.paths import CONFIGS
