@@ -20,15 +20,15 @@ _WANDER_DN = 2.0  # of the black level between exposures, and rounding
 _MOST_DRIFT = 0.02  # during the levels: the fit takes off a steady drift, and warming up is none
 
 
-def require_dark(darks: Sequence[Sequence[Frame]], rig: Rig) -> None:
+def require_dark(darks: Sequence[Frame], rig: Rig) -> None:
     """Raise `NotDetermined` if darks rise with the exposure as no dark current does.
 
-    `darks`: frames by rising exposure. A gamma lifts dark counts; `require_no_lamp_in_darks` is
-    stricter, when the response is known.
+    `darks`: a frame of each exposure, rising. A gamma lifts dark counts; when the response is
+    known, `require_no_lamp_in_darks` is stricter.
     """
     span = rig.camera.max_dn - rig.camera.black_level_dn
-    levels = [float(np.median(frames[0].image)) for frames in darks]
-    exposures = [frames[0].exposure_s for frames in darks]
+    levels = [float(np.median(frame.image)) for frame in darks]
+    exposures = [frame.exposure_s for frame in darks]
     per_s = _WARM * rig.camera.dark_current_electrons_per_s
     per_s += MOST_LIGHT * rig.lamp.white_electrons_per_s
     for level, exposure_s in zip(levels[1:], exposures[1:], strict=True):
@@ -55,13 +55,12 @@ def require_unsaturated(frames: Sequence[Frame], rig: Rig) -> None:
 
 
 def require_exposures(asked_s: Sequence[float], taken_s: Sequence[float]) -> None:
-    """Raise `DeviceError` if a camera did not take different exposures as asked, in seconds."""
-    if len(set(taken_s)) < len(taken_s):
-        pairs = ", ".join(f"{a:g}: {t:g}" for a, t in zip(asked_s, taken_s, strict=True))
+    """Raise `DeviceError` if a camera took fewer different exposures than asked, in seconds."""
+    if len(taken_s) < len(asked_s):
+        asked, taken = (", ".join(f"{e:g}" for e in values) for values in (asked_s, taken_s))
         raise DeviceError(
-            f"camera: takes the same exposure for different ones (asked and taken, s: {pairs}): "
-            "correct min_exposure_s and max_exposure_s in the rig file, or switch off automatic "
-            "exposure"
+            f"camera: was asked for exposures of {asked} s and took {taken} s: correct "
+            "min_exposure_s and max_exposure_s in the rig file, or switch off automatic exposure"
         )
 
 

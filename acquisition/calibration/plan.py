@@ -65,13 +65,14 @@ class CalibrationPlan:
         overhead = self.rig.camera.frame_overhead_s
         full_s = self.expected_saturating_s()
         lit = [self.frames * (e + overhead) for e in self.lit_exposures_s(full_s)]
-        darks = self.dark_exposures_s()
-        dark = [self.dark_frames(e, darks) * (e + overhead) for e in darks]
+        dark = [self.dark_frames(e) * (e + overhead) for e in self.dark_exposures_s()]
         return sum(lit) + sum(dark) + FLAT_FRAMES * (full_s / 2 + overhead)
 
-    def dark_frames(self, exposure_s: float, exposures_s: list[float]) -> int:
+    def dark_frames(self, exposure_s: float) -> int:
         """Return the frames of a dark: more at both ends, from which each pixel's values come."""
-        return FLAT_FRAMES if exposure_s in (exposures_s[0], exposures_s[-1]) else self.frames
+        camera = self.rig.camera
+        ends = (camera.min_exposure_s, camera.max_exposure_s)
+        return FLAT_FRAMES if exposure_s in ends else self.frames
 
     def lines(self) -> Iterator[str]:
         """Yield the plan in words."""
@@ -81,11 +82,11 @@ class CalibrationPlan:
             f"{rig.camera.width_px} x {rig.camera.height_px} pixels, {rig.camera.bit_depth} bit"
         )
         yield "1. the operator places a matt white surface that fills the picture; nothing moves"
+        yield f"2. lamp lit: a flat field at half of full scale, {FLAT_FRAMES} frames"
         yield (
-            f"2. lamp dark: {len(darks)} exposures of {darks[0]:g} to {darks[-1]:g} s, "
+            f"3. lamp dark: {len(darks)} exposures of {darks[0]:g} to {darks[-1]:g} s, "
             f"{self.frames} frames each, {FLAT_FRAMES} at both ends"
         )
-        yield f"3. lamp lit: a flat field at half of full scale, {FLAT_FRAMES} frames"
         yield (
             f"4. lamp lit: {self.exposures} exposures up to saturation, {self.frames} frames each, "
             "in an order that no drift of the lamp can imitate"

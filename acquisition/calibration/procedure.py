@@ -40,6 +40,16 @@ class Measured:
     patch: Patch
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Darks:
+    """Levels of the darks, stacks of the shortest and the longest one, and the patch."""
+
+    levels: LevelSeries
+    short: Stack
+    long: Stack
+    patch: Patch
+
+
 @dataclass(slots=True, kw_only=True)
 class CameraCalibrator:
     """Devices of a rig at work on a plan; `say` tells the operator what is going on."""
@@ -53,28 +63,41 @@ class CameraCalibrator:
     def measure(self) -> Measured:
         """Measure everything; the lamp is left lit."""
         self.operator.ask(Request("place", PLACE, surface="sample"))
-        darks = self._darks()
-        self.lamp.light()
+        if self.plan.rig.lamp.darkened_by == "shutter":
+            self.lamp.light()
         flat = self._flat()
-        short, long = (stack_of(frames) for frames in (darks[0], darks[-1]))
-        hot = find_hot_pixels(long.mean_dn, self.plan.rig.camera)
-        patch = patch_of(flat, short, hot)
-        lit = self._levels(patch)
-        dark = [level_of(frames, patch.level, darks[0][0].time_s) for frames in darks]
+        self.lamp.darken()
+        darks = self._darks(flat)
+        self.lamp.light()
         return Measured(
-            lit=lit, dark=series_of(dark, patch.pixels), flat=flat, short_dark=short,
-            long_dark=long, patch=patch,
+            lit=self._levels(darks.patch), dark=darks.levels, flat=flat, short_dark=darks.short,
+            long_dark=darks.long, patch=darks.patch,
         )  # fmt: skip
 
-    def _darks(self) -> list[list[Frame]]:
-        """Take frames without light at each exposure, rising."""
+    def _darks(self, flat: Stack) -> _Darks:
+        """Take frames without light: of the shortest and the longest exposure, then of the others.
+
+        The hot pixels in the longest are no part of the patch. No more than one series of frames is
+        held at a time.
+        """
         exposures = self.plan.dark_exposures_s()
         self.say(f"darks: {len(exposures)} exposures")
-        self.lamp.darken()
-        taken = [self._frames(e, self.plan.dark_frames(e, exposures)) for e in exposures]
-        checks.require_exposures(exposures, [frames[0].exposure_s for frames in taken])
-        checks.require_dark(taken, self.plan.rig)
-        return taken
+        series = [self._dark(e) for e in (exposures[0], exposures[-1])]
+        checks.require_dark([frames[0] for frames in series], self.plan.rig)
+        short, long = map(stack_of, series)
+        camera = self.plan.rig.camera
+        patch = patch_of(flat, camera.black_level_dn, find_hot_pixels(long.mean_dn, camera))
+        start_s = series[0][0].time_s
+        levels = [level_of(frames, patch.level, start_s) for frames in series]
+        del series
+        levels += [level_of(self._dark(e), patch.level, start_s) for e in exposures[1:-1]]
+        found = series_of(levels, patch.pixels)
+        checks.require_exposures(exposures, found.exposure_s.tolist())
+        return _Darks(levels=found, short=short, long=long, patch=patch)
+
+    def _dark(self, exposure_s: float) -> list[Frame]:
+        """Take the frames of a dark."""
+        return self._frames(exposure_s, self.plan.dark_frames(exposure_s))
 
     def _flat(self) -> Stack:
         """Take the flat field near half of full scale."""

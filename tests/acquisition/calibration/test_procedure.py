@@ -65,14 +65,15 @@ def calibrator(rig: OpenRig, devices: Recorder) -> CameraCalibrator:
     )
 
 
-def test_darks_come_first_and_the_lamp_is_covered_once() -> None:
+def test_the_lamp_is_covered_once() -> None:
     with OpenRig(small_scan().rig, white_mm=200.0) as rig:
         rig.pose_scene(0.0)
         devices = Recorder(rig)
         measured = calibrator(rig, devices).measure()
     order = [call for call in devices.calls if call != "grab"]
-    assert order == ["place", "darken", "light"]
-    dark, lit = devices.calls.index("darken"), devices.calls.index("light")
+    assert order == ["place", "light", "darken", "light"]
+    dark = devices.calls.index("darken")
+    lit = devices.calls.index("light", dark)
     assert devices.calls[dark:lit].count("grab") == 6
     assert measured.dark.mean_dn == pytest.approx(64, abs=8)
     assert measured.lit.mean_dn[-1] > 4000
@@ -99,6 +100,6 @@ def test_no_axis_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_camera_that_takes_one_exposure_for_several_is_named() -> None:
-    with pytest.raises(DeviceError, match=r"same exposure for different ones .*0.2: 0.1"):
-        checks.require_exposures([0.1, 0.2], [0.1, 0.1])
+    with pytest.raises(DeviceError, match=r"asked for exposures of 0.1, 0.2 s and took 0.1 s"):
+        checks.require_exposures([0.1, 0.2], [0.1])
     checks.require_exposures([0.1, 0.2], [0.1, 0.19])
