@@ -156,6 +156,7 @@ def test_wrong_input_ends_before_anything_is_measured(
     [
         ("world shutter_shut 1 at camera.grab 1", {}, "the darks are not dark.*Cover the lamp"),
         ("world shutter_shut 0.05 at camera.grab 1", {}, "the darks are not dark"),
+        ("world shutter_shut 0.02 at camera.grab 1", {}, "like 2 % of the lamp's light"),
         ("", {"white_electrons_per_s": 1e9}, "pixels of the flat field are saturated at 0.0005 s"),
         ("", {"white_electrons_per_s": 2e6, "min_exposure_s": 0.012}, "are below saturation"),
         ("", {"white_electrons_per_s": 1e3}, "of full scale; needed: 50 %"),
@@ -163,7 +164,10 @@ def test_wrong_input_ends_before_anything_is_measured(
         ("world noise 0 at camera.grab 1", {}, "its frames have no noise"),
         ("world lamp 0.7 at camera.grab 36", {}, "the lamp's light changed by"),
     ],
-    ids=["lamp on", "leak", "saturated", "few", "dim", "fixed", "denoised", "lamp fails"],
+    ids=[
+        "lamp on", "leak", "small leak", "saturated", "few", "dim", "fixed", "denoised",
+        "lamp fails",
+    ],
 )  # fmt: skip
 def test_frames_that_tell_nothing_end_with_5_and_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str, rig: dict[str, Any], words: str
@@ -175,6 +179,15 @@ def test_frames_that_tell_nothing_end_with_5_and_no_file(
     assert (done.returncode, done.stdout) == (5, ""), done.stderr
     assert re.search(words, " ".join(done.stderr.split())), done.stderr
     assert sorted(p.name for p in tmp_path.iterdir()) == ["rig.yaml"]
+
+
+def test_an_open_shutter_ends_it_with_the_darks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GONIO_FAULTS", "world shutter_shut 1 at camera.grab 1")
+    done = gonio("calibrate", "camera", "--rig", rig_file(tmp_path), "-o", tmp_path / "c.npz")
+    assert "darks: 6 exposures" in done.stderr
+    assert "photon transfer" not in done.stderr
 
 
 def test_a_camera_that_fails_leaves_no_file(

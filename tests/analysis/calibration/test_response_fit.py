@@ -73,6 +73,14 @@ def test_a_proportional_camera_gets_no_curve() -> None:
     assert fit.response.nonlinearity() == 0.0
 
 
+def test_a_bend_that_flicker_hides_is_part_of_u() -> None:
+    """Flicker of 0.3 % in two frames leaves a bend of some 0.1 % open, chosen or not."""
+    model = SensorModel(flicker=0.003)
+    fit = fit_camera(*model.levels(20), model.max_dn)
+    assert fit.response.curve.name == "proportional"
+    assert 5e-4 < fit.response.u_light_relative < 5e-3
+
+
 def test_a_shutter_that_opens_too_long_is_no_non_linearity() -> None:
     """Exposures that are all 0.2 ms longer than set only shift the level at exposure 0."""
     model = SensorModel()
