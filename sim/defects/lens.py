@@ -47,9 +47,9 @@ def bent_by_lens(image: FloatImage, lens: LensDefects) -> FloatImage:
 def veiled(light: FloatImage, share: float, width_px: float) -> FloatImage:
     """Return the picture with a share of its light scattered; what leaves the frame is lost.
 
-    Point spread w / (2 pi (r^2 + w^2)^1.5) of the scattered light, with `width_px` w: integral 1,
-    and a tail with the third power, as stray light of photographic lenses has (Bitlis, Jansson and
-    Allebach, Proc. SPIE 6498 (2007) 64980V, fitted such a power).
+    Point spread w / (2 pi (r^2 + w^2)^1.5) of the scattered light, with `width_px` w: integral 1.
+    Its tail is a power of the distance, as fits of the stray light of cameras have it (Bitlis,
+    Jansson, Allebach and Wei, WO 2008/089385); the third is assumed.
     """
     step = max(1, round(width_px / _COARSE))
     rows, columns = light.shape
