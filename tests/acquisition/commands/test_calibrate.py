@@ -17,16 +17,16 @@ from tests.support.paths import CONFIGS
 
 BENCH, PAPER = (CONFIGS / "rigs" / f"{name}.yaml" for name in ("bench_12bit", "paper_1995"))
 HOT = ((20, 30), (80, 110), (81, 110))
-QUICK = ("--exposures", "20", "--frames", "3")
+QUICK = ("--exposures", "18", "--frames", "2")
 
 
 def rig_file(
     folder: Path, defects: dict[str, Any] | None = None, base: Path = BENCH, **camera: Any
 ) -> Path:
-    """A rig with a quarter of the pixels a side, its camera changed."""
+    """A rig with a fifth of the pixels a side, its camera changed."""
     rig = yaml.safe_load(base.read_text())
     for key in ("width_px", "height_px", "axis_row_px", "axis_column_px"):
-        rig["camera"][key] = type(rig["camera"][key])(rig["camera"][key] / 4)
+        rig["camera"][key] = type(rig["camera"][key])(rig["camera"][key] / 5)
     for key, value in camera.items():
         place = rig["lamp"] if key in rig["lamp"] else rig["camera"]
         place[key] = value

@@ -64,9 +64,9 @@ def pulls(model: SensorModel, fit: CameraFit) -> dict[str, float]:
 
 @pytest.mark.slow
 def test_random_sensors_are_recovered_within_their_u(slow: bool) -> None:
-    """Limits of 4 sensors: 4.5 sigma each; of 300: the spread of the pulls too."""
+    """Limits of 3 sensors: 4.5 sigma each; of 300: the spread of the pulls too."""
     found: dict[str, list[float]] = {}
-    for seed in range(300 if slow else 4):
+    for seed in range(300 if slow else 3):
         model, fit = random_sensor(seed)
         for name, pull in pulls(model, fit).items():
             found.setdefault(name, []).append(pull)
@@ -112,7 +112,7 @@ def test_a_camera_that_does_not_saturate_has_no_full_well() -> None:
 
 def test_saturation_capacity_is_below_the_full_well_by_no_more_than_its_u() -> None:
     model = SensorModel(shading=0.0)
-    transfer = fit_camera(*model.levels(60), model.max_dn).transfer
+    transfer = fit_camera(*model.levels(40), model.max_dn).transfer
     assert transfer.saturation_electrons is not None
     assert transfer.full_well_electrons is not None
     most = transfer.full_well_electrons.value
@@ -121,7 +121,7 @@ def test_saturation_capacity_is_below_the_full_well_by_no_more_than_its_u() -> N
 
 def test_flicker_of_the_lamp_is_told() -> None:
     model = SensorModel(flicker=0.003)
-    fit = fit_camera(*model.levels(40, 4), model.max_dn)
+    fit = fit_camera(*model.levels(24, 4), model.max_dn)
     assert fit.flicker == pytest.approx(0.003, rel=0.3)
 
 

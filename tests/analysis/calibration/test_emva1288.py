@@ -24,7 +24,7 @@ routines = pytest.importorskip("emva1288.process.routines", reason=MISSING)
 data = pytest.importorskip("emva1288.process.data", reason=MISSING)
 results = pytest.importorskip("emva1288.process.results", reason=MISSING)
 
-WIDTH, HEIGHT, LEVELS, STACK = 120, 100, 24, 12
+WIDTH, HEIGHT, LEVELS, STACK = 110, 90, 22, 10
 CASES: dict[int, dict[str, float]] = {
     8: {"K": 0.02, "blackoffset": 8, "sigma2_dark_0": 900.0},
     10: {"K": 0.05, "blackoffset": 20, "sigma2_dark_0": 300.0},

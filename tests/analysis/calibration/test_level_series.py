@@ -33,8 +33,8 @@ def test_the_u_of_rounding_is_the_spread_over_places_between_two_counts(noise_dn
 
 def test_flicker_and_wander_are_those_of_the_frames() -> None:
     model = SensorModel(flicker=0.002)
-    lit, dark = model.levels(40, 4)
-    relative, wander = flicker(lit.chosen(np.arange(30)), dark)
+    lit, dark = model.levels(28, 4)
+    relative, wander = flicker(lit.chosen(np.arange(21)), dark)
     assert relative == pytest.approx(0.002, rel=0.3)
     assert wander < 0.02
 

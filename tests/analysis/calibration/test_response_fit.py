@@ -30,7 +30,7 @@ def bt709(share: Array) -> Array:
 
 def fit_of(curve: Callable[[Array], Array]) -> tuple[SensorModel, CameraFit]:
     model = SensorModel(curve=curve)
-    return model, fit_camera(*model.levels(30), model.max_dn)
+    return model, fit_camera(*model.levels(22), model.max_dn)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_a_bend_that_flicker_hides_is_part_of_u() -> None:
 def test_a_shutter_that_opens_too_long_is_no_non_linearity() -> None:
     """Exposures that are all 0.2 ms longer than set only shift the level at exposure 0."""
     model = SensorModel()
-    lit, dark = model.levels(30)
+    lit, dark = model.levels(20)
     set_s = lit.exposure_s - 0.0002
     fit = fit_camera(replace(lit, exposure_s=set_s), dark, model.max_dn)
     assert fit.response.curve.name == "proportional"
