@@ -201,9 +201,20 @@ def _largest_shared(m: Measurements) -> float:
 
 
 def _rejected(fitted: AveragedFit) -> bool:
-    found = fitted.solution
-    dof = max(fitted.problem.brdf.size - found.x.size, 1)
-    return probability(found.chi2, dof) < SIGNIFICANCE
+    return probability(*_misfit(fitted)) < SIGNIFICANCE
+
+
+def _misfit(fitted: AveragedFit) -> tuple[float, int]:
+    """chi2 and its degrees of freedom, at least one, without the outliers of a robust fit.
+
+    Counted, they would pass for noise of all points, and beside it no longer be outliers.
+    """
+    problem, found = fitted.problem, fitted.solution
+    if problem.huber is None:
+        return found.chi2, max(problem.brdf.size - found.x.size, 1)
+    residual = problem.residual(found.x)
+    good = residual[~_outliers(residual)]
+    return float(good @ good), max(good.size - found.x.size, 1)
 
 
 def _widened(
@@ -213,13 +224,15 @@ def _widened(
     stated = linear.problem.covariance
     factor = 1.0
     for _ in range(_ROUNDS_OF_WIDENING):
-        factor *= max(1.0, reduced_chi2(fitted.problem, fitted.solution))
+        chi2, dof = _misfit(fitted)
+        factor *= max(1.0, chi2 / dof)
         problem = replace(
             linear.problem, covariance=replace(stated, variance=stated.variance * factor)
         )
         found = problem.solve(linear.solution.x)
         fitted = _averaged(_Linearised(problem, found, linear.others), m, acceptance)
-        if reduced_chi2(fitted.problem, fitted.solution) < _WIDE_ENOUGH:
+        chi2, dof = _misfit(fitted)
+        if chi2 < _WIDE_ENOUGH * dof:
             break
     return fitted
 

@@ -7,12 +7,14 @@ import pytest
 
 from analysis.choice.choice import choose
 from analysis.data.measurements import Measurements
+from analysis.fit.criteria import probability
 from analysis.fit.first_fit import first_fit
 from analysis.fit.fit import fit
 from analysis.models import MODELS
 from instrument.errors import NotDetermined
 from instrument.geometry import Geometry
 from tests.support.analysis.seeded_scan import noise_free, problem_of
+from tests.support.analysis.table_faults import matt_table, with_outliers
 
 
 def test_too_few_points() -> None:
@@ -138,6 +140,17 @@ def test_outliers_are_reported_and_the_truth_is_found(seed: int, stated: bool) -
     if stated:  # without the robust loss, no model agrees within the stated u
         plain = choose(m, models=["lambert", NAME])
         assert plain.verdict == "none adequate" or (plain.u_scale or 0) > 2
+
+
+def test_many_outliers_do_not_pass_for_noise_of_all_points() -> None:
+    """A tenth of the points wrong by 10 to 60 %, with u = 0.3 %: only these are set aside."""
+    for seed in range(8):
+        sound = matt_table(seed)
+        m, wild = with_outliers(sound.measurements, 0.1, seed)
+        found = fit(sound.model, m, robust=True)
+        assert np.flatnonzero(found.outliers).tolist() == sorted(wild.tolist())
+        assert found.chi2 is not None
+        assert probability(found.chi2, found.dof) > 1e-3
 
 
 @pytest.mark.parametrize("stated", [True, False])
