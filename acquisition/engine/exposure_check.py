@@ -8,6 +8,7 @@ first.
 from __future__ import annotations
 
 import logging
+import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -28,6 +29,7 @@ log = logging.getLogger(__name__)
 
 ALLOWED_S, ALLOWED_EXPOSURES = 2.0, 2.0  # extra time a scan: 2 s and twice its longest exposure
 _LONG_S = 0.1  # a longer exposure is compared with an eighth of it, a shorter one with a quarter
+_GAMMAS = 1.5, 3.0  # of video and photography
 _MAX_TRIES = 3  # of one exposure, in a scene too dark to prove anything
 
 
@@ -102,7 +104,19 @@ class ExposureCheck:
 
 def _disbelief(found: Proportion) -> WrongRigFile:
     return WrongRigFile(
-        f"camera: {found.text()}: it does not expose as long as it says (limited by its frame "
-        "rate, in coarse steps, or automatic), or the lamp flickers; allow only exposures that it "
-        "makes (min_exposure_s, max_exposure_s), or lower frames_per_s, in the rig file"
+        f"camera: {found.text()}: {_gamma_text(found)}it does not expose as long as it says "
+        "(limited by its frame rate, in coarse steps, or automatic), or the lamp flickers; allow "
+        "only exposures that it makes (min_exposure_s, max_exposure_s), or lower frames_per_s, in "
+        "the rig file"
+    )
+
+
+def _gamma_text(found: Proportion) -> str:
+    """Return the gamma that these counts would have, empty if no usual one."""
+    gamma = math.log(found.expected) / math.log(max(found.ratio, 1.001))
+    if not _GAMMAS[0] < gamma < _GAMMAS[1]:
+        return ""
+    return (
+        f"as with a gamma of {gamma:.2g} that is left on: switch it off in the camera, or measure "
+        "it (gonio calibrate camera) and name the file in the rig file (camera: calibration); or "
     )

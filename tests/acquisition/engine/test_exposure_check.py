@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -73,6 +74,16 @@ def test_an_exposure_that_the_camera_does_not_make_stops_the_scan(
     fixed, longest = defects.get("fixed_exposure_s"), defects.get("longest_exposure_s", 10)
     assert fixed not in wrong
     assert all(exposure_s <= longest * 1.01 for exposure_s in wrong)
+
+
+@pytest.mark.parametrize("gamma", [1.8, 2.2, 2.4])
+def test_a_gamma_that_is_left_on_is_named(new_record: Record, gamma: float) -> None:
+    words = r"a gamma of ([\d.]+) that is left on: .*gonio calibrate camera"
+    with pytest.raises(DeviceError, match=words) as stopped:
+        scan(grey_card({"gamma": gamma}), new_record)
+    found = re.search(words, str(stopped.value))
+    assert found is not None
+    assert float(found[1]) == pytest.approx(gamma, abs=0.2)
 
 
 @pytest.mark.parametrize("upto", [10, 13])
