@@ -67,7 +67,7 @@ def test_a_fit_is_printed_whole_at_any_width(
     names = ["lambert", "oren_nayar+torrance_sparrow", "lambert+ggx", "wolff",
              "oren_nayar_qualitative+torrance_sparrow_lobe+single_scattering"]  # fmt: skip
     choice = choose(read_csv(path), None, names)
-    monkeypatch.setattr(fit, "choose", lambda *_: choice)
+    monkeypatch.setattr(fit, "choose", lambda *_, **__: choice)
 
     def show() -> None:
         with suppress(NotDetermined):
