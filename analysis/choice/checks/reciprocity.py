@@ -28,13 +28,14 @@ _SAME_DEG, _LEAST_APART_DEG = 0.25, 2.0
 # Least median difference that is told, relative to the value. With a stated u: above what a tilt of
 # 0.2 degrees does to a matt sample. Without: above the noise of a usual table.
 _NOTABLE, _NOTABLE_WITHOUT_U = 0.02, 0.05
-_FEWEST, _FEWEST_WITHOUT_U = 2, 5  # pairs
+# Pairs. One alone tells a cosine, if it agrees with it closely, and nothing else.
+_FEWEST, _FEWEST_WITHOUT_U = 2, 5
 # Standard deviations by which more than half of the pairs must differ, so that a few outliers are
 # no verdict on the sample.
 _BEYOND = 3.0
 # A cosine, or one factor of each incidence, is the cause where dividing by it leaves no more than
 # this share of the difference. Factors need twice as many pairs, or they would explain anything.
-_LEFT_BY_CAUSE = 1 / 3
+_LEFT_BY_CAUSE, _LEFT_BY_CAUSE_OF_ONE = 1 / 3, 1 / 10
 _PAIRS_PER_LEVEL = 2
 _MOST_LEVELS = 8  # that are listed
 # Steps of a sweep, in degrees, whose second differences show noise rather than shape.
@@ -73,9 +74,10 @@ class Reciprocity(NamedTuple):
     def __str__(self) -> str:
         u = "no u stated" if self.u is None else f"u {100 * self.u:.2g} %"
         theta_i, theta_r, dphi = self.at_deg
+        pairs = "pair" if self.pairs == 1 else "pairs"
         seen = (
             "reciprocity (Helmholtz) is broken: with lamp and camera exchanged, values differ by "
-            f"{100 * self.median:.2g} % (median of {self.pairs} pairs, {u}; largest "
+            f"{100 * self.median:.2g} % (median of {self.pairs} {pairs}, {u}; largest "
             f"{100 * self.largest:.2g} %, at theta_i {theta_i:.4g}, theta_r {theta_r:.4g}, dphi "
             f"{dphi:.4g} degrees)"
         )
@@ -110,7 +112,7 @@ def reciprocity(m: Measurements, smooth: Brdf) -> Reciprocity | None:
     angles, and the small distance between the directions of a pair.
     """
     low, high = reciprocal_pairs(m)
-    if low.size < (_FEWEST_WITHOUT_U if m.u_random is None else _FEWEST):
+    if low.size < (_FEWEST_WITHOUT_U if m.u_random is None else 1):
         return None
     mean, model = (m.brdf[low] + m.brdf[high]) / 2, smooth(m.geometry)
     difference = m.brdf[low] - m.brdf[high] - (model[low] - model[high])
@@ -124,7 +126,8 @@ def reciprocity(m: Measurements, smooth: Brdf) -> Reciprocity | None:
     at = float(m.theta_i_deg[k]), float(m.theta_r_deg[k]), float(m.dphi_deg[k])
     u = None if C is None else float(np.median(C.u_total / np.abs(mean)))
     cause = _cause(m, low, high)
-    return Reciprocity(low.size, median, float(relative[worst]), at, u, *cause)
+    found = Reciprocity(low.size, median, float(relative[worst]), at, u, *cause)
+    return found if found.by_cosine or low.size >= _FEWEST else None
 
 
 def reciprocal_pairs(m: Measurements) -> tuple[IntArray, IntArray]:
@@ -202,7 +205,8 @@ def _cause(
     expected = np.log(cos[low] / cos[high])
     rests = {"cos(theta_i)": ratio - expected, "cos(theta_r)": ratio + expected}
     levels, rests[INCIDENCE] = _levels(m, low, high, ratio)
-    most = _LEFT_BY_CAUSE * float(np.median(np.abs(ratio)))
+    share = _LEFT_BY_CAUSE if ratio.size >= _FEWEST else _LEFT_BY_CAUSE_OF_ONE
+    most = share * float(np.median(np.abs(ratio)))
     for name, rest in rests.items():
         left = float(np.median(np.abs(rest)))
         if left <= most:

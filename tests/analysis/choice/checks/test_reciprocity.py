@@ -134,6 +134,19 @@ def test_an_anisotropic_sample_is_no_matter_of_the_incidence() -> None:
         assert "white tile" not in str(found)
 
 
+def test_one_pair_tells_a_cosine_and_nothing_else() -> None:
+    """Half a sweep of two incidences has one pair."""
+    for seed in range(10):
+        sound = matt_table(seed)
+        m = sound.measurements.subset(sound.measurements.theta_r_deg <= 0)
+        assert reciprocal_pairs(m)[0].size == 1
+        found = reciprocity(scaled(m, np.cos(m.geometry.theta_i)), sound.brdf)
+        assert found is not None
+        assert found.cause == "cos(theta_i)"
+        uneven = np.where(m.theta_i_deg == m.theta_i_deg.max(), 2.5, 1.0)  # no ratio of cosines
+        assert reciprocity(scaled(m, uneven), sound.brdf) is None
+
+
 def test_a_few_outliers_are_no_verdict_on_the_sample() -> None:
     sound = matt_table(4, incidences=3)
     m = sound.measurements
