@@ -12,6 +12,13 @@ import typer
 
 from acquisition.cli_parts import Commands, Json, RigOnly
 
+CalibrationFile = Annotated[
+    Path | None, typer.Option("--out", "-o", help="File for the calibration, new, .npz.")
+]
+PlanOnly = Annotated[
+    bool, typer.Option("--plan", help="Show what would be measured; opens no device.")
+]
+
 calibrate = typer.Typer(
     cls=Commands,
     no_args_is_help=True,
@@ -23,12 +30,8 @@ calibrate = typer.Typer(
 @calibrate.command()
 def camera(
     rig: RigOnly = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File for the calibration, new, .npz.")
-    ] = None,
-    plan: Annotated[
-        bool, typer.Option("--plan", help="Show what would be measured; opens no device.")
-    ] = False,
+    out: CalibrationFile = None,
+    plan: PlanOnly = False,
     exposures: Annotated[int, typer.Option(help="Number of exposures with the lamp lit.")] = 30,
     frames: Annotated[int, typer.Option(help="Frames at each exposure.")] = 4,
     json: Json = False,
@@ -42,3 +45,40 @@ def camera(
     from acquisition.commands.calibrate import calibrate_camera
 
     calibrate_camera(rig, out, exposures=exposures, frames=frames, plan_only=plan, as_json=json)
+
+
+@calibrate.command()
+def lamp(
+    rig: RigOnly = None,
+    out: CalibrationFile = None,
+    plan: PlanOnly = False,
+    minutes: Annotated[float, typer.Option(help="Longest time to watch the lamp.")] = 30.0,
+    every_s: Annotated[float, typer.Option(help="Seconds between two readings.")] = 10.0,
+    frames: Annotated[int, typer.Option(help="Frames of each reading.")] = 4,
+    limit_percent: Annotated[
+        float, typer.Option(help="Change of the light that a steady lamp does not exceed ...")
+    ] = 0.2,
+    within_minutes: Annotated[
+        float, typer.Option(help="... within this time: between two drift checks; 60: an hour.")
+    ] = 10.0,
+    window_mm: Annotated[float, typer.Option(help="Side of the square that is watched.")] = 20.0,
+    tile_mm: Annotated[float, typer.Option(help="Side of the white tile.")] = 50.0,
+    theta_i_deg: Annotated[float, typer.Option(help="Where the lamp stands, with dphi 0.")] = 30.0,
+    theta_r_deg: Annotated[float, typer.Option(help="Where the camera stands.")] = 0.0,
+    json: Json = False,
+) -> None:
+    """Calibrate the lamp: warm-up, drift, flicker, and uniformity over the sample.
+
+    Watches a white tile and ends once the lamp is steady, or after --minutes. The operator places
+    the tile, and covers a lamp that has no shutter; nothing moves. Exits with 0 whether or not the
+    lamp became steady, with 5 if there is no light or saturation, with 3 if the lamp goes out or
+    jumps.
+    """
+    from acquisition.commands.calibrate import calibrate_lamp
+
+    options = {
+        "minutes": minutes, "every_s": every_s, "frames": frames, "limit_percent": limit_percent,
+        "within_minutes": within_minutes, "window_mm": window_mm, "tile_mm": tile_mm,
+        "theta_i_deg": theta_i_deg, "theta_r_deg": theta_r_deg,
+    }  # fmt: skip
+    calibrate_lamp(rig, out, options, plan_only=plan, as_json=json)

@@ -159,10 +159,11 @@ class OpenRig(Closeable):
         if self._scene is not None:
             self._scene.begin_step(step, scan_s)
 
-    def pose_scene(self, theta_r_deg: float) -> None:
+    def pose_scene(self, theta_r_deg: float, theta_i_deg: float = 30.0) -> None:
         """Set the axes of a scene so that the camera sees the lit sample; moves nothing real."""
         if self._scene is not None:
-            for name, angle_deg in (("theta_i", 30.0), ("dphi", 0.0), ("theta_r", theta_r_deg)):
+            pose = {"theta_i": theta_i_deg, "dphi": 0.0, "theta_r": theta_r_deg}
+            for name, angle_deg in pose.items():
                 self._scene.set_axis(name, angle_deg)
 
     def _stage(self, name: str) -> Stage:

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.calibration import checks
+from acquisition.calibration.exposure_search import exposure_reaching, share_of_scale
 from acquisition.calibration.frame_statistics import level_of, series_of, stack_of
 from acquisition.calibration.patch import Patch, patch_of
-from acquisition.calibration.plan import FLAT_FRAMES, FLAT_TARGET, CalibrationPlan, nearest_s
+from acquisition.calibration.plan import FLAT_FRAMES, FLAT_TARGET, CalibrationPlan
 from acquisition.measure.hot_pixels import find_hot_pixels
 from analysis.calibration.level_series import LevelSeries
 from analysis.calibration.pixel_maps import Stack
 from instrument.devices import Camera, Frame, Lamp, Operator, Request
 
-_STEPS_OF_SEARCH = 6  # bisections: saturation is then known to 1 %
 _SEED = 1288  # of the order of exposures: the same each time
 PLACE = (
     "Place a matt white surface on the table so that it fills the picture without gloss; the lamp "
@@ -120,31 +120,14 @@ class CameraCalibrator:
         return series_of(levels, patch.pixels)
 
     def _exposure_for(self, share: float, patch: Patch | None = None) -> float:
-        """Return the exposure in seconds at which the bright pixels reach a share of full scale.
-
-        The longest one, if none does. It is found by halving intervals, which no gamma misleads.
-        """
-        camera = self.plan.rig.camera
-        low, high = camera.min_exposure_s, camera.max_exposure_s
-        if self._share(low, patch) >= share:
-            return low
-        while low < high and self._share(min(4 * low, high), patch) < share:
-            low = min(4 * low, high)
-        high = min(4 * low, high)
-        for _ in range(_STEPS_OF_SEARCH):
-            middle = nearest_s(float(np.sqrt(low * high)), camera)
-            if not low < middle < high:
-                break
-            low, high = (middle, high) if self._share(middle, patch) < share else (low, middle)
-        return low
+        """Return the exposure in seconds at which the bright pixels reach a share of full scale."""
+        return exposure_reaching(share, lambda e: self._share(e, patch), self.plan.rig.camera)
 
     def _share(self, exposure_s: float, patch: Patch | None) -> float:
         """Return the level of the bright pixels of one frame, as a share of full scale."""
-        camera = self.plan.rig.camera
         image = self._frames(exposure_s, 1)[0].image
         level = np.percentile(image, 95) if patch is None else np.mean(image[patch.level])
-        black = camera.black_level_dn
-        return (float(level) - black) / (checks.SATURATED * camera.max_dn - black)
+        return share_of_scale(float(level), self.plan.rig.camera)
 
     def _frames(self, exposure_s: float, count: int) -> list[Frame]:
         """Take frames at an exposure in seconds, as nearly as the camera can set it."""

@@ -22,7 +22,8 @@ from analysis.calibration.pixel_maps import (
     made_linear,
     prnu,
 )
-from instrument.calibration.camera_calibration import CameraCalibration, Quantity
+from instrument.calibration.camera_calibration import CameraCalibration
+from instrument.calibration.quantity import Quantity
 from instrument.config.rig import Rig
 from instrument.devices import CHANGING_SETTINGS, Camera
 from instrument.geometry import BoolArray, FloatArray
@@ -95,9 +96,9 @@ def _quantities(
          transfer.full_well_electrons),
         ("dark_dn", "mu_y.dark", "dark level", "DN", transfer.dark_dn),
     )  # fmt: skip
-    yield "gain_dn_per_electron", _quantity(transfer.gain_dn_per_electron, "DN/e-", "K", "gain")
+    yield "gain_dn_per_electron", quantity(transfer.gain_dn_per_electron, "DN/e-", "K", "gain")
     for key, symbol, name, unit, estimate in electrons:
-        yield key, _quantity(estimate, unit, symbol, name)
+        yield key, quantity(estimate, unit, symbol, name)
     for key, symbol, value in (
         ("linearity_error_min_percent", "LE min", fit.linearity.least_percent),
         ("linearity_error_max_percent", "LE max", fit.linearity.most_percent),
@@ -106,7 +107,7 @@ def _quantities(
     bend = None
     if not response.curve.is_video:
         bend = Estimate(100 * response.nonlinearity(), 200 * response.u_light_relative)
-    yield "nonlinearity_percent", _quantity(bend, "%", "", "non-linearity")
+    yield "nonlinearity_percent", quantity(bend, "%", "", "non-linearity")
     used = flat.measured & ~flat.deviant
     yield from _uniformity(measured, fit, used)
     for key, name, mask in (
@@ -137,14 +138,15 @@ def _uniformity(
     lit, dark = (made_linear(s, fit.response) for s in (measured.flat, measured.short_dark))
     response = prnu(lit, dark, used)
     percent = Estimate(100 * response.value, 100 * response.u)
-    yield "prnu_percent", _quantity(percent, "%", "PRNU1288", "spread of responses")
+    yield "prnu_percent", quantity(percent, "%", "PRNU1288", "spread of responses")
     offset = None
     if not fit.response.curve.is_video:
         offset = dsnu(dark, used, fit.transfer.gain_dn_per_electron.value)
-    yield "dsnu_electrons", _quantity(offset, "e-", "DSNU1288", "spread of darks")
+    yield "dsnu_electrons", quantity(offset, "e-", "DSNU1288", "spread of darks")
 
 
-def _quantity(estimate: Estimate | None, unit: str, symbol: str, name: str) -> Quantity:
+def quantity(estimate: Estimate | None, unit: str, symbol: str, name: str) -> Quantity:
+    """Return an estimate, or what was not determined, as a quantity."""
     value, u = (None, None) if estimate is None else map(float, estimate)
     return Quantity(value=value, u=u, unit=unit, symbol=symbol, name=name)
 

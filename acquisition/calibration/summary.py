@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 from acquisition.calibration.result import rig_file_values
 from acquisition.terminal.layout import table_lines, wrapped
-from instrument.calibration.camera_calibration import CameraCalibration, Quantity
+from instrument.calibration.camera_calibration import CameraCalibration
+from instrument.calibration.quantity import Quantity
 from instrument.config.rig import Rig
 
 
@@ -15,10 +16,25 @@ def summary_lines(calibration: CameraCalibration, rig: Rig, width: int) -> Itera
     """Yield the lines of the summary for a terminal of this width."""
     yield from wrapped(f"calibration of {calibration.camera}, {calibration.date_utc}", width)
     stated = rig_file_values(rig)
-    rows = [_row(quantity, stated.get(key)) for key, quantity in calibration.quantities.items()]
-    yield from table_lines(("quantity", "symbol", "value", "rig file"), rows, width)
+    yield from quantity_lines(calibration.quantities, stated, width)
     yield ""
     yield from wrapped(response_text(calibration), width)
+
+
+def quantity_lines(
+    quantities: dict[str, Quantity], stated: dict[str, float], width: int
+) -> list[str]:
+    """Return quantities as a table, beside what the rig file states by the same key."""
+    rows = [_row(quantity, stated.get(key)) for key, quantity in quantities.items()]
+    return table_lines(("quantity", "symbol", "value", "rig file"), rows, width)
+
+
+def quantities_json(quantities: dict[str, Quantity]) -> dict[str, object]:
+    """Return quantities as JSON takes them."""
+    return {
+        key: {"value": q.value, "u": q.u, "unit": q.unit, "symbol": q.symbol, "name": q.name}
+        for key, q in quantities.items()
+    }
 
 
 def response_text(calibration: CameraCalibration) -> str:
@@ -45,10 +61,7 @@ def summary_json(calibration: CameraCalibration, file: str) -> dict[str, object]
         "settings": calibration.settings,
         "rig": calibration.rig,
         "date_utc": calibration.date_utc,
-        "quantities": {
-            key: {"value": q.value, "u": q.u, "unit": q.unit, "symbol": q.symbol, "name": q.name}
-            for key, q in calibration.quantities.items()
-        },
+        "quantities": quantities_json(calibration.quantities),
         "response": {
             "name": calibration.curve.name,
             "kind": calibration.curve.kind,

@@ -1,12 +1,18 @@
-"""Command `gonio calibrate camera`: measures a camera and writes its calibration. Nothing moves."""
+"""Commands `gonio calibrate ...`: measure a device and write its calibration. Nothing moves."""
 
 from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
+from acquisition.calibration.lamp.plan import LampPlan
+from acquisition.calibration.lamp.result import lamp_calibration_of
+from acquisition.calibration.lamp.summary import lamp_json, lamp_lines
+from acquisition.calibration.lamp.watch import LampWatcher
 from acquisition.calibration.plan import CalibrationPlan
 from acquisition.calibration.procedure import CameraCalibrator
 from acquisition.calibration.result import calibration_of
@@ -16,8 +22,10 @@ from acquisition.rig import OpenRig, restart_for_emulated_camera
 from acquisition.terminal.console import console, out, print_lines, print_notes
 from acquisition.terminal.operator import require_terminal
 from acquisition.terminal.orderly_end import orderly_end
+from instrument.calibration.archive import SUFFIX
 from instrument.calibration.camera_calibration import CameraCalibration
-from instrument.calibration.camera_file import SUFFIX, write_camera_file
+from instrument.calibration.camera_file import write_camera_file
+from instrument.calibration.lamp_file import LampCalibration, write_lamp_file
 from instrument.config.rig import Rig
 from instrument.errors import InputError
 
@@ -39,7 +47,7 @@ def calibrate_camera(
     if plan_only:
         print_lines(plan.lines())
         return
-    path = _require_path(path)
+    path = _require_path(path, "camera")
     if rig.real:
         require_terminal(str(rig_path))
     restart_for_emulated_camera(rig)
@@ -49,10 +57,10 @@ def calibrate_camera(
     _print(written, rig, path, as_json)
 
 
-def _require_path(path: Path | None) -> Path:
+def _require_path(path: Path | None, device: str) -> Path:
     """Return the path of the file to be; raise `InputError` before anything is measured."""
     if path is None:
-        raise InputError("gonio calibrate camera: name the file to write: -o FILE.npz")
+        raise InputError(f"gonio calibrate {device}: name the file to write: -o FILE.npz")
     if path.suffix != SUFFIX:
         raise InputError(f"{path}: the file's name must end in {SUFFIX}")
     if path.exists():
@@ -86,5 +94,50 @@ def _print(calibration: CameraCalibration, rig: Rig, path: Path, as_json: bool) 
         sys.stdout.write(json.dumps(summary_json(calibration, str(path))) + "\n")
         return
     print_lines(summary_lines(calibration, rig, out.width))
+    _print_end(calibration, path)
+
+
+def _print_end(calibration: CameraCalibration | LampCalibration, path: Path) -> None:
     print_notes(calibration.notes)
     print_lines([f"file: {path} (sha256 {calibration.sha256[:16]}...)"])
+
+
+def calibrate_lamp(
+    rig_path: Path | None,
+    path: Path | None,
+    options: Mapping[str, Any],
+    *,
+    plan_only: bool,
+    as_json: bool,
+) -> None:
+    """Calibrate the lamp of a rig and write the file `path`; `plan_only`: only say how.
+
+    `options` of `LampPlan`, by their names.
+    """
+    rig = require_rig(rig_path)
+    plan = LampPlan(rig=rig, **options)
+    if plan_only:
+        print_lines(plan.lines())
+        return
+    path = _require_path(path, "lamp")
+    if rig.real:
+        require_terminal(str(rig_path))
+    restart_for_emulated_camera(rig)
+    with orderly_end():
+        written = write_lamp_file(path, _watched(plan))
+    if as_json:
+        sys.stdout.write(json.dumps(lamp_json(written, str(path))) + "\n")
+        return
+    print_lines(lamp_lines(written, rig, out.width))
+    _print_end(written, path)
+
+
+def _watched(plan: LampPlan) -> LampCalibration:
+    with OpenRig(plan.rig, white_mm=plan.tile_mm) as open_rig:
+        open_rig.pose_scene(plan.theta_r_deg, plan.theta_i_deg)
+        camera, lamp = open_rig.camera(), open_rig.lamp
+        watcher = LampWatcher(
+            plan=plan, camera=camera, lamp=lamp, operator=open_rig.operator, clock=open_rig.clock,
+            say=_say,
+        )  # fmt: skip
+        return lamp_calibration_of(watcher.measure(), plan, lamp, camera, datetime.now(UTC))

@@ -92,6 +92,27 @@ def flicker(lit: LevelSeries, dark: LevelSeries) -> tuple[float, float]:
     return float(np.sqrt(max(relative2, 0.0))), float(np.sqrt(wander2))
 
 
+def flicker_estimate(lit: LevelSeries, wander_dn: float, dark_dn: float) -> Estimate:
+    """Return the lamp's relative flicker from frame to frame with its u, from levels (exposures,).
+
+    wander_dn: of the black level, from frame to frame. dark_dn: level without light.
+    """
+    signal2 = np.maximum(lit.mean_dn - dark_dn, 1.0) ** 2
+    own = lit.scatter_dn2 - lit.variance_dn2 / lit.pixels - wander_dn**2
+    u_scatter = lit.scatter_dn2 * np.sqrt(2 / (lit.frames - 1))
+    u = float(np.linalg.norm(u_scatter / signal2)) / lit.frames.size
+    return root_of(Estimate(float(np.mean(own / signal2)), u), 1.0)
+
+
+def root_of(variance: Estimate, scale: float) -> Estimate:
+    """Return the root of a variance, over a scale; a variance of about 0 has the u of its root."""
+    if variance.value > 2 * variance.u:
+        root = float(np.sqrt(variance.value))
+        return Estimate(root / scale, variance.u / (2 * root) / scale)
+    most = float(np.sqrt(max(variance.value, 0.0) + 2 * variance.u)) / scale
+    return Estimate(most / 2, most / float(np.sqrt(12)))
+
+
 def saturation_index(variance_dn2: FloatArray) -> int:
     """Return the index of the largest variance (exposures,) in DN², exposures in rising order.
 

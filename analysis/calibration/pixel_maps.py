@@ -11,7 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.calibration.level_series import ROUNDING_DN2, Estimate, rounding_of_mean_dn
+from analysis.calibration.level_series import (
+    ROUNDING_DN2,
+    Estimate,
+    root_of,
+    rounding_of_mean_dn,
+)
 from analysis.calibration.response_fit import ResponseFit
 from instrument.geometry import BoolArray, FloatArray
 
@@ -112,7 +117,7 @@ def _relative(signal: FloatArray, stack: Stack, used: BoolArray) -> tuple[FloatA
 def dsnu(dark: Stack, used: BoolArray, gain_dn_per_electron: float) -> Estimate:
     """Return DSNU1288 in electrons from a dark stack in DN and the pixels used (rows, columns)."""
     spatial = _spatial_variance_dn2(dark.mean_dn, dark, used)
-    return _root(spatial, gain_dn_per_electron)
+    return root_of(spatial, gain_dn_per_electron)
 
 
 def prnu(lit: Stack, dark: Stack, used: BoolArray) -> Estimate:
@@ -121,16 +126,7 @@ def prnu(lit: Stack, dark: Stack, used: BoolArray) -> Estimate:
     bright = _spatial_variance_dn2(lit.mean_dn, lit, used)
     base = _spatial_variance_dn2(dark.mean_dn, dark, used)
     difference = Estimate(bright.value - base.value, float(np.hypot(bright.u, base.u)))
-    return _root(difference, signal)
-
-
-def _root(variance: Estimate, scale: float) -> Estimate:
-    """Return the root of a variance, over a scale; a variance of about 0 has the u of its root."""
-    if variance.value > 2 * variance.u:
-        root = float(np.sqrt(variance.value))
-        return Estimate(root / scale, variance.u / (2 * root) / scale)
-    most = float(np.sqrt(max(variance.value, 0.0) + 2 * variance.u)) / scale
-    return Estimate(most / 2, most / float(np.sqrt(12)))
+    return root_of(difference, signal)
 
 
 def _spatial_variance_dn2(mean_dn: FloatArray, stack: Stack, used: BoolArray) -> Estimate:

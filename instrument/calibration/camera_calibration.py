@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
+from instrument.calibration.quantity import Quantity
 from instrument.calibration.response_curve import ResponseCurve
 from instrument.errors import InputError
 from instrument.geometry import FloatArray
@@ -22,17 +23,6 @@ MAPS = (
 """Pixel maps, each (rows, columns): see `analysis.calibration.pixel_maps`."""
 LEVEL_COLUMNS = ("exposure_s", "mean_dn", "variance_dn2", "scatter_dn2", "frames", "age_s")
 """Columns of the tables `lit` and `dark`: what was measured, to be evaluated again."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Quantity:
-    """Property with its standard uncertainty; None for both where it was not determined."""
-
-    value: float | None
-    u: float | None
-    unit: str
-    symbol: str
-    name: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,79 +1,41 @@
-"""File of a camera's calibration: a ZIP archive of `calibration.json` and arrays of NumPy.
-
-Any program reads it: `numpy.load` the arrays, `unzip -p FILE calibration.json` the rest.
-"""
+"""File of a camera's calibration: see `archive` for its form."""
 
 from __future__ import annotations
 
-import hashlib
-import io
 import json
 import math
-import zipfile
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from instrument.calibration.camera_calibration import (
-    LEVEL_COLUMNS,
-    MAPS,
-    CameraCalibration,
-    Quantity,
-)
+from instrument.calibration.archive import Archive, bytes_of, without_format
+from instrument.calibration.camera_calibration import LEVEL_COLUMNS, MAPS, CameraCalibration
+from instrument.calibration.quantity import Quantity
 from instrument.calibration.response_curve import ResponseCurve
 from instrument.errors import InputError
 from instrument.geometry import FloatArray
-from instrument.text.atomic_file import read_file, write_whole
 
-SUFFIX = ".npz"
-_FORMAT, _VERSION = "gonio camera calibration", 1
-_HEADER = "calibration.json"
-_MOST_BYTES = 2 * 10**9  # of a file and of what it unpacks to: sensors of 50 million pixels
-_DATE = (1980, 1, 1, 0, 0, 0)  # of members, the earliest of ZIP: equal contents are equal files
+_ARCHIVE = Archive("camera", 1)
 
 
 def write_camera_file(path: Path, calibration: CameraCalibration) -> CameraCalibration:
     """Write a calibration, whole or not at all, and return it with its hash."""
-    header, arrays = _header(calibration), _packed(calibration.arrays)
-    digest = _digest(header, arrays)
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        text = json.dumps({**header, "sha256": digest}, indent=1, ensure_ascii=False)
-        archive.writestr(zipfile.ZipInfo(_HEADER, _DATE), text + "\n")
-        for name, array in arrays.items():
-            with archive.open(zipfile.ZipInfo(f"{name}.npy", _DATE), "w") as member:
-                np.lib.format.write_array(member, array, allow_pickle=False)
-    write_whole(path, buffer.getvalue())
+    digest = _ARCHIVE.write(path, _own(calibration), _packed(calibration.arrays))
     return replace(calibration, sha256=digest)
 
 
 def read_camera_file(path: Path) -> CameraCalibration:
     """Read a calibration; raise `InputError` if it is none, damaged, or of another version."""
-    raw = _bytes_of(path)
-    try:
-        header, arrays = _unpacked(raw)
-    except (zipfile.BadZipFile, KeyError, ValueError, EOFError, OSError) as error:
-        raise InputError(
-            f"{path}: is no camera calibration, or is damaged ({error}); allowed: a file that "
-            "gonio calibrate camera wrote"
-        ) from error
-    if header.get("format") != _FORMAT or header.get("version") != _VERSION:
-        raise InputError(
-            f"{path}: is {header.get('format')!r}, version {header.get('version')!r}; allowed: "
-            f"{_FORMAT!r}, version {_VERSION}. Calibrate again"
-        )
-    digest = header.pop("sha256", None)
-    if digest != _digest(header, arrays):
-        raise InputError(f"{path}: was changed or damaged since it was written. Calibrate again")
+    header, arrays, digest = _ARCHIVE.read(path)
     _require_arrays(path, arrays)
     return replace(_calibration(path, header, digest), arrays=arrays)
 
 
 def header_text(calibration: CameraCalibration) -> str:
     """Return all but the arrays as the text that a run keeps: see `read_camera_header`."""
-    header = {**_header(calibration), "sha256": calibration.sha256}
+    header = {**_ARCHIVE.header(_own(calibration)), "sha256": calibration.sha256}
     return json.dumps(header, indent=1, ensure_ascii=False) + "\n"
 
 
@@ -83,23 +45,15 @@ def read_camera_header(path: Path) -> CameraCalibration:
     Who wrote it, the run, proves it by a hash of its own.
     """
     try:
-        header = json.loads(_bytes_of(path))
+        header = json.loads(bytes_of(path))
         digest = header.pop("sha256")
     except (ValueError, KeyError, AttributeError, TypeError) as error:
         raise InputError(f"{path}: is no copy of a camera calibration ({error})") from error
     return _calibration(path, header, digest)
 
 
-def _bytes_of(path: Path) -> bytes:
-    try:
-        return read_file(path, _MOST_BYTES)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: cannot be read ({reason}): check its name") from error
-
-
-def _header(calibration: CameraCalibration) -> dict[str, Any]:
-    own = {**asdict(replace(calibration, arrays={})), "format": _FORMAT, "version": _VERSION}
+def _own(calibration: CameraCalibration) -> dict[str, Any]:
+    own = asdict(replace(calibration, arrays={}))
     del own["arrays"], own["sha256"]
     return {**own, "notes": list(calibration.notes)}
 
@@ -112,38 +66,12 @@ def _packed(arrays: dict[str, FloatArray]) -> dict[str, Any]:
     }
 
 
-def _digest(header: dict[str, Any], arrays: dict[str, Any]) -> str:
-    """Return the SHA-256 of all that is stored."""
-    whole = hashlib.sha256(json.dumps(header, sort_keys=True).encode())
-    for name, array in sorted(arrays.items()):
-        whole.update(f"{name} {array.dtype.str} {array.shape}".encode())
-        whole.update(np.ascontiguousarray(array).tobytes())
-    return whole.hexdigest()
-
-
-def _unpacked(raw: bytes) -> tuple[dict[str, Any], dict[str, Any]]:
-    with zipfile.ZipFile(io.BytesIO(raw)) as archive:
-        if sum(info.file_size for info in archive.infolist()) > _MOST_BYTES:
-            raise ValueError("larger than any calibration")
-        header = json.loads(archive.read(_HEADER))
-        if not isinstance(header, dict):
-            raise ValueError(f"{_HEADER} is no table")
-        arrays = {}
-        for name in archive.namelist():
-            if name.endswith(".npy"):
-                member = io.BytesIO(archive.read(name))
-                arrays[name.removesuffix(".npy")] = np.lib.format.read_array(
-                    member, allow_pickle=False
-                )
-    return header, arrays
-
-
 def _calibration(path: Path, header: dict[str, Any], digest: str) -> CameraCalibration:
     """Return the calibration that a file holds, without arrays; its hash was found right."""
     try:
         curve = header["curve"]
         quantities = {key: Quantity(**own) for key, own in header["quantities"].items()}
-        own = {k: v for k, v in header.items() if k not in ("format", "version")}
+        own = without_format(header)
         own.update(
             curve=ResponseCurve(curve["kind"], tuple(map(float, curve["parameters"]))),
             quantities=quantities, notes=tuple(header["notes"]), arrays={}, sha256=digest,

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from instrument.calibration.camera_calibration import MAPS, CameraCalibration, Quantity
+from instrument.calibration.camera_calibration import MAPS, CameraCalibration
 from instrument.calibration.camera_file import read_camera_file, write_camera_file
+from instrument.calibration.quantity import Quantity
 from instrument.calibration.response_curve import GAMMA, POLYNOMIAL, ResponseCurve
 from instrument.errors import InputError
 
