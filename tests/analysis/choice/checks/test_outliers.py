@@ -1,6 +1,6 @@
 """Outliers: found where a model explains all but a few points, and not where a model is missing.
 
-False alarms: none in 200 sound scans of random models, half without u (slow form; normally 2).
+False alarms: none in 200 sound scans of random models, half without u (slow form; normally 1).
 Found: at least 90 % of tables with 3 to 10 % of outliers.
 """
 
@@ -35,7 +35,7 @@ def found(m: Measurements, *names: str) -> Outliers | None:
 @pytest.mark.slow
 def test_sound_scans_of_random_models_give_no_alarm(slow: bool) -> None:
     told = []
-    for seed in range(200 if slow else 2):
+    for seed in range(200 if slow else 1):
         sound = sound_table(seed)
         if not np.mean(sound.measurements.brdf) > DARK:
             continue  # refused by the choice of a model
@@ -46,7 +46,7 @@ def test_sound_scans_of_random_models_give_no_alarm(slow: bool) -> None:
 @pytest.mark.slow
 def test_systematic_errors_of_a_bench_are_no_outliers(slow: bool) -> None:
     """Rarely, as an error that grows may look like one: in 1 % of the scans at most."""
-    seeds, told = range(3000, 3300 if slow else 3002), []
+    seeds, told = range(3000, 3300 if slow else 3001), []
     for seed in seeds:
         sound = sound_table(seed)
         if np.mean(sound.measurements.brdf) > DARK:
