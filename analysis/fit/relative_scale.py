@@ -28,14 +28,17 @@ def normalise_lamp_levels(m: Measurements, brdf: Brdf) -> Measurements:
     """Divide the points of each lamp setting by its level relative to a model near the data.
 
     `brdf` gives BRDF in 1/sr, of the geometry's shape. The remaining error of a level is small and
-    counts as a shared error like any other.
+    counts as a shared error like any other. A setting at which the model, or the sample, is dark
+    keeps its level.
     """
     if not m.free_levels:
         return m
     model = brdf(m.geometry)
     weight = model / (np.square(m.u_random) if m.u_random is not None else np.ones(m.size))
     settings = m.lamp_setting
-    level = np.bincount(settings, m.brdf * weight) / np.bincount(settings, model * weight)
+    seen, expected = (np.bincount(settings, values * weight) for values in (m.brdf, model))
+    lit = (seen > 0) & (expected > 0)
+    level = np.divide(seen, expected, out=np.ones(seen.size), where=lit)
     u = None if m.u_random is None else m.u_random / level[settings]
     return replace(m, brdf=m.brdf / level[settings], u_random=u)
 

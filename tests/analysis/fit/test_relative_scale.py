@@ -44,6 +44,25 @@ def test_lamp_levels_are_normalised_to_the_model() -> None:
     assert normalise_lamp_levels(replace(m, free_levels=False), brdf).brdf is m.brdf
 
 
+@pytest.mark.parametrize("dark", ["model", "sample"])
+def test_a_lamp_setting_at_which_all_is_dark_keeps_its_level(dark: str) -> None:
+    """A narrow lobe may send nothing into any view of one setting."""
+    m = noise_free(MODEL.name, TRUTH)
+    unlit = m.lamp_setting == 1
+    levels = np.array([1.0, 3.0, 0.2])[m.lamp_setting]
+    if dark == "sample":
+        levels = np.where(unlit, 0.0, levels)
+    u_random = np.full(m.size, 1e-3)
+    m = replace(m, brdf=m.brdf * levels, u_random=u_random, relative=True, free_levels=True)
+
+    def brdf(geometry: Geometry) -> FloatArray:
+        return np.where(unlit & (dark == "model"), 0.0, MODEL.brdf(geometry, **TRUTH))
+
+    found = normalise_lamp_levels(m, brdf)
+    assert found.brdf[unlit] == pytest.approx(m.brdf[unlit], rel=1e-12)
+    assert found.brdf[~unlit] == pytest.approx(noise_free(MODEL.name, TRUTH).brdf[~unlit])
+
+
 def test_no_light_is_an_error() -> None:
     with pytest.raises(ValueError, match="mean of the relative values = 0"):
         relative_model(MODEL, np.zeros(3))
