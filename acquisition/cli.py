@@ -17,6 +17,7 @@ import typer
 
 from acquisition.calibrate_cli import calibrate
 from acquisition.cli_parts import Commands, Json, RigOnly
+from acquisition.new_cli import new
 from acquisition.terminal import stop_signals
 from acquisition.terminal.streams import lasting_streams
 from instrument.errors import StorageError
@@ -33,6 +34,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.add_typer(calibrate, name="calibrate")
+app.add_typer(new, name="new")
 
 _AXES = ("theta_i", "dphi", "theta_r")
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.v4l2 import ioctl
@@ -33,14 +34,77 @@ def descriptions(devices: Iterable[str]) -> list[str]:
     return [text for text in found if text]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoundCamera:
+    """Camera as its driver describes it.
+
+    `purpose`: of a node that delivers no pictures in one plane, empty for one that does. `formats`:
+    sizes by pixel format. `limited_range`: that of YUYV, None if another format is set now.
+    """
+
+    device: str
+    card: str
+    driver: str
+    bus: str
+    purpose: str
+    formats: Mapping[str, tuple[str, ...]]
+    controls: tuple[ioctl.Control, ...]
+    limited_range: bool | None = None
+
+    @property
+    def exposure(self) -> ioctl.Control | None:
+        """Control of the exposure, in steps of 100 us; None if the camera has none."""
+        return self._control(ioctl.EXPOSURE_ABSOLUTE)
+
+    @property
+    def gain(self) -> ioctl.Control | None:
+        """Control of the gain; None if the camera has none."""
+        return self._control(ioctl.GAIN)
+
+    def _control(self, number: int) -> ioctl.Control | None:
+        return next((c for c in self.controls if c.number == number), None)
+
+    def lines(self) -> Iterator[str]:
+        """Yield one line for the device, one per format and one per control."""
+        purpose = f": {self.purpose}" if self.purpose else ""
+        yield f"  {self.device}: {self.card} ({self.driver}, {self.bus}){purpose}"
+        for name, sizes in self.formats.items():
+            yield f"    {name}: {', '.join(sizes) or 'any size'}"
+        for control in self.controls:
+            span = f"{control.minimum} to {control.maximum} in steps of {control.step}"
+            yield f"    {control.name} ({control.kind}): {control.value}; {span}"
+
+
+def found_cameras(devices: Iterable[str]) -> list[FoundCamera]:
+    """Return the cameras that answer and deliver pictures in one plane."""
+    found = []
+    for device in devices:
+        try:
+            camera = read_camera(device)
+        except DeviceError:
+            continue
+        if camera is not None and not camera.purpose:
+            found.append(camera)
+    return found
+
+
 def describe(device: str) -> str:
     """Return one line for the device, one per format and one per control.
 
     The camera may be in use: nothing is changed. Empty for a node of another purpose.
     """
+    camera = read_camera(device)
+    return "" if camera is None else "\n".join(camera.lines())
+
+
+def read_camera(device: str) -> FoundCamera | None:
+    """Return what a device says of itself; None for a node of another purpose.
+
+    The camera may be in use: nothing is changed. Raises `DeviceError` for one that does not answer.
+    """
     try:
         with ioctl.opened(device) as descriptor:
-            return "\n".join(_lines(device, descriptor))
+            return _camera(device, descriptor)
     except OSError as error:
         raise DeviceError(
             f"camera {device}: does not answer as a V4L2 capture device "
@@ -49,13 +113,26 @@ def describe(device: str) -> str:
         ) from error
 
 
-def _lines(device: str, descriptor: int) -> Iterator[str]:
+def _camera(device: str, descriptor: int) -> FoundCamera | None:
     c = ioctl.capability(descriptor)
     if not c.captures and not c.node & ioctl.MULTI_PLANAR:
-        return
-    yield f"  {device}: {c.card} ({c.driver}, {c.bus}){'' if c.captures else f': {c.purpose}'}"
-    for name in ioctl.formats(descriptor):
-        yield f"    {name}: {', '.join(ioctl.sizes(descriptor, name)) or 'any size'}"
-    for control in ioctl.controls(descriptor):
-        span = f"{control.minimum} to {control.maximum} in steps of {control.step}"
-        yield f"    {control.name} ({control.kind}): {control.value}; {span}"
+        return None
+    formats = {n: tuple(ioctl.sizes(descriptor, n)) for n in ioctl.formats(descriptor)}
+    return FoundCamera(
+        device=device,
+        card=c.card,
+        driver=c.driver,
+        bus=c.bus,
+        purpose="" if c.captures else c.purpose,
+        formats=formats,
+        controls=tuple(ioctl.controls(descriptor)),
+        limited_range=_limited_range(descriptor),
+    )
+
+
+def _limited_range(descriptor: int) -> bool | None:
+    try:
+        now = ioctl.current_format(descriptor)
+    except OSError:  # a node with several planes has no such format
+        return None
+    return now.limited_range if now.name == "YUYV" else None

@@ -56,6 +56,15 @@ class Archive:
         write_whole(path, buffer.getvalue())
         return digest
 
+    def wrote(self, path: Path) -> bool:
+        """Return True if a file says that it is of this kind; it may be damaged all the same."""
+        try:
+            with zipfile.ZipFile(path) as archive:
+                header = json.loads(archive.read(_HEADER))
+        except (zipfile.BadZipFile, KeyError, ValueError, EOFError, OSError):
+            return False
+        return isinstance(header, dict) and header.get("format") == self.format
+
     def read(self, path: Path) -> tuple[dict[str, Any], Arrays, str]:
         """Return header, arrays and hash of a file.
 

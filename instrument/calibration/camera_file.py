@@ -18,6 +18,8 @@ from instrument.errors import InputError
 from instrument.geometry import FloatArray
 
 _ARCHIVE = Archive("camera", 1)
+is_camera_file = _ARCHIVE.wrote
+"""True for a path of such a file, which may be damaged all the same."""
 
 
 def write_camera_file(path: Path, calibration: CameraCalibration) -> CameraCalibration:

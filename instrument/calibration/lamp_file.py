@@ -21,6 +21,8 @@ READING_COLUMNS = ("age_s", "signal_dn", "u_dn")
 CELL_COLUMNS = ("x_mm", "y_mm", "light", "pixels")
 _TABLES = {"readings": len(READING_COLUMNS), "cells": len(CELL_COLUMNS)}
 _ARCHIVE = Archive("lamp", 1)
+is_lamp_file = _ARCHIVE.wrote
+"""True for a path of such a file, which may be damaged all the same."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

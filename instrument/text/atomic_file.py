@@ -6,33 +6,58 @@ import errno
 import os
 import shutil
 import stat
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from instrument.errors import StorageError
+from instrument.errors import InputError, StorageError
 
 _FORBIDDEN = (errno.EROFS, errno.EACCES, errno.EPERM)
+_NO_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK)
 
 
-def write_whole(path: Path, content: str | bytes, *, linked_folder: bool = True) -> None:
+def write_whole(
+    path: Path, content: str | bytes, *, linked_folder: bool = True, new: bool = False
+) -> None:
     """Write bytes, or text as UTF-8, under a temporary name, flush to disk, then rename.
 
     A reader of `path` sees the old file or the whole new one, also after a power cut. A link under
-    the file's name is replaced; `linked_folder`: its folder may be a link. Raises `StorageError`.
+    the file's name is replaced; `linked_folder`: its folder may be a link. `new`: nothing that
+    bears this name is replaced. Raises `StorageError`, and `InputError` for a name that is taken.
     """
     data = content if isinstance(content, bytes) else content.encode("utf-8", "replace")
     follow = 0 if linked_folder else os.O_NOFOLLOW
     try:
         folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | follow)
         try:
-            _write_in(folder, path.name, data)
+            _write_in(folder, path.name, data, _link_new if new else _rename)
         finally:
             os.close(folder)
+    except FileExistsError:
+        raise InputError(f"{path}: exists already: choose another name") from None
     except OSError as error:
         raise StorageError(f"{path}: {explain_os_error(error, path.parent)}") from error
 
 
-def _write_in(folder: int, name: str, data: bytes) -> None:
+def _rename(part: str, name: str, folder: int) -> None:
+    os.replace(part, name, src_dir_fd=folder, dst_dir_fd=folder)
+
+
+def _link_new(part: str, name: str, folder: int) -> None:
+    """Give a file its name, unless that is taken: a link, unlike a rename, replaces nothing."""
+    try:
+        os.link(part, name, src_dir_fd=folder, dst_dir_fd=folder, follow_symlinks=False)
+    except OSError as error:
+        if error.errno not in _NO_LINKS:
+            raise
+        # A disk without hard links, such as a memory card's: the name is taken by an empty file.
+        os.close(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666, dir_fd=folder))
+        _rename(part, name, folder)
+
+
+def _write_in(
+    folder: int, name: str, data: bytes, give_name: Callable[[str, str, int], None]
+) -> None:
     """Write a file of an open folder, which stays the same whatever happens to its path."""
     part = f".{name}.{os.getpid()}.part"
     try:
@@ -43,7 +68,7 @@ def _write_in(folder: int, name: str, data: bytes) -> None:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        os.replace(part, name, src_dir_fd=folder, dst_dir_fd=folder)
+        give_name(part, name, folder)
         os.fsync(folder)
     finally:
         with suppress(OSError):  # the error that matters is the first one

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.discovery import identify_controller
+from drivers.discovery import FoundPort, identify_controller
 from instrument.clock import SystemClock
 from sim.emulated.motor import Mechanics, Motor
 from sim.emulated.newport_controller import NewportController
@@ -46,3 +46,17 @@ def test_a_silent_port_has_no_answer() -> None:
 
 def test_a_missing_port_is_reported(tmp_path: Path) -> None:
     assert "cannot open" in identify_controller(str(tmp_path / "nowhere"))
+
+
+@pytest.mark.parametrize(
+    ("answer", "driver"),
+    [
+        ("'@01 0 OK IDLE' when asked as Zaber", "zaber"),
+        ("'1VE SMC_CC' when asked as Newport SMC100", "newport"),
+        ("'1VE' when asked as Newport CONEX-CC", "newport"),
+        ("no answer", ""),
+        ("", ""),
+    ],
+)
+def test_the_driver_of_a_controller_that_answered(answer: str, driver: str) -> None:
+    assert FoundPort(path="/dev/ttyUSB0", text="adapter", answer=answer).driver == driver

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from instrument.errors import StorageError
+from instrument.errors import InputError, StorageError
 from instrument.text.atomic_file import read_file, write_whole
 
 
@@ -51,3 +51,23 @@ def test_a_pipe_is_refused_unless_it_is_allowed(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(OSError, match="it is a device, a pipe or a socket, not a file"):
         read_file(tmp_path / "pipe", 10)
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_a_new_file_replaces_nothing(
+    links: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also on a disk without hard links, and where the name was taken since it was looked at."""
+
+    def no_link(*arguments: object, **options: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    if not links:
+        monkeypatch.setattr(os, "link", no_link)
+    write_whole(tmp_path / "rig.yaml", "new", new=True)
+    (tmp_path / "mine.yaml").symlink_to(tmp_path / "nowhere")
+    for name in ("rig.yaml", "mine.yaml"):
+        with pytest.raises(InputError, match=f"{name}: exists already: choose another name"):
+            write_whole(tmp_path / name, "other", new=True)
+    assert (tmp_path / "rig.yaml").read_text() == "new"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.yaml", "rig.yaml"]

@@ -1,0 +1,1 @@
+"""Helpers for drafts of rig files and protocols."""
