@@ -10,6 +10,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from acquisition.engine.axis import Axis
@@ -51,12 +52,17 @@ def check_ready(loaded: Loaded) -> None:
 
         require_terminal(str(loaded.protocol_path))
     restart_for_emulated_camera(loaded.rig)
-    measured = loaded.rig.camera.measured
-    if measured is not None:
+    if loaded.rig.camera.measured is not None:
         with orderly_end(), OpenRig(loaded.rig, faults=Faults()) as rig:
-            camera = rig.camera()
-            name = f"{loaded.rig_path}: camera: calibration: {loaded.rig.camera.calibration}"
-            measured.require_camera(name, camera.identity(), camera.settings())
+            require_own_calibration(loaded.rig, loaded.rig_path, rig.camera())
+
+
+def require_own_calibration(rig: Rig, path: Path, camera: Camera) -> None:
+    """Raise `InputError` if the calibration that a rig file names is that of another camera."""
+    measured = rig.camera.measured
+    if measured is not None:
+        name = f"{path}: camera: calibration: {rig.camera.calibration}"
+        measured.require_camera(name, camera.identity(), camera.settings())
 
 
 def require_dated(loaded: Loaded) -> None:
@@ -64,9 +70,14 @@ def require_dated(loaded: Loaded) -> None:
 
     A resumed scan goes on with the calibration that it began with.
     """
-    measured = loaded.rig.camera.measured
+    require_calibration_date(loaded.rig, loaded.rig_path)
+
+
+def require_calibration_date(rig: Rig, path: Path) -> None:
+    """Raise `InputError` if the calibration that a rig file names is outdated."""
+    measured = rig.camera.measured
     if measured is not None:
-        name = f"{loaded.rig_path}: camera: calibration: {loaded.rig.camera.calibration}"
+        name = f"{path}: camera: calibration: {rig.camera.calibration}"
         measured.require_date(name, datetime.now(UTC))
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.calibration.level_series import LevelSeries
 from analysis.calibration.pixel_maps import Stack
@@ -12,14 +14,23 @@ from instrument.devices import Frame
 from instrument.geometry import BoolArray, FloatArray
 
 Level = tuple[float, float, float, float, float, float]
+Linear = Callable[[NDArray[Any]], NDArray[Any]]
 
 
-def stack_of(frames: Sequence[Frame]) -> Stack:
-    """Return mean and variance of each pixel; exact sums of whole numbers, frame by frame."""
+def as_counted(counts: NDArray[Any]) -> NDArray[Any]:
+    """Return counts in DN, of any shape, as the camera gave them."""
+    return counts
+
+
+def stack_of(frames: Sequence[Frame], linear: Linear = as_counted) -> Stack:
+    """Return mean and variance of each pixel, summed up frame by frame; exact for whole counts.
+
+    linear: makes counts linear in light.
+    """
     shape = frames[0].image.shape
-    total, squares = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
+    total, squares = np.zeros(shape), np.zeros(shape)
     for frame in frames:
-        counts = frame.image.astype(np.int64)
+        counts = linear(frame.image).astype(np.float64)
         total += counts
         squares += counts * counts
     count = len(frames)
@@ -29,12 +40,15 @@ def stack_of(frames: Sequence[Frame]) -> Stack:
     )
 
 
-def level_of(frames: Sequence[Frame], patch: BoolArray, start_s: float) -> Level:
+def level_of(
+    frames: Sequence[Frame], patch: BoolArray, start_s: float, linear: Linear = as_counted
+) -> Level:
     """Return a row of a `LevelSeries` for the pixels of a patch (rows, columns).
 
     Counts in DN, times in s from `start_s` on. The variance is without what a frame has in common.
+    linear: makes counts linear in light.
     """
-    counts = np.stack([frame.image[patch] for frame in frames]).astype(np.float64)
+    counts = np.stack([linear(frame.image[patch]) for frame in frames]).astype(np.float64)
     means = counts.mean(axis=1)
     own = (counts - means[:, None]).var(axis=0, ddof=1)
     middle_s = float(np.mean([frame.time_s for frame in frames]))

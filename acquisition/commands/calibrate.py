@@ -18,7 +18,12 @@ from acquisition.calibration.procedure import CameraCalibrator
 from acquisition.calibration.result import calibration_of
 from acquisition.calibration.summary import summary_json, summary_lines
 from acquisition.commands.setup import require_rig
-from acquisition.rig import OpenRig, restart_for_emulated_camera
+from acquisition.rig import (
+    OpenRig,
+    require_calibration_date,
+    require_own_calibration,
+    restart_for_emulated_camera,
+)
 from acquisition.terminal.console import console, out, print_lines, print_notes
 from acquisition.terminal.operator import require_terminal
 from acquisition.terminal.orderly_end import orderly_end
@@ -114,7 +119,7 @@ def calibrate_lamp(
 
     `options` of `LampPlan`, by their names.
     """
-    rig = require_rig(rig_path)
+    rig = require_rig(rig_path, calibrated=True)
     plan = LampPlan(rig=rig, **options)
     if plan_only:
         print_lines(plan.lines())
@@ -124,7 +129,7 @@ def calibrate_lamp(
         require_terminal(str(rig_path))
     restart_for_emulated_camera(rig)
     with orderly_end():
-        written = write_lamp_file(path, _watched(plan))
+        written = write_lamp_file(path, _watched(plan, rig_path or Path()))
     if as_json:
         sys.stdout.write(json.dumps(lamp_json(written, str(path))) + "\n")
         return
@@ -132,10 +137,12 @@ def calibrate_lamp(
     _print_end(written, path)
 
 
-def _watched(plan: LampPlan) -> LampCalibration:
+def _watched(plan: LampPlan, rig_path: Path) -> LampCalibration:
+    require_calibration_date(plan.rig, rig_path)
     with OpenRig(plan.rig, white_mm=plan.tile_mm) as open_rig:
         open_rig.pose_scene(plan.theta_r_deg, plan.theta_i_deg)
         camera, lamp = open_rig.camera(), open_rig.lamp
+        require_own_calibration(plan.rig, rig_path, camera)
         watcher = LampWatcher(
             plan=plan, camera=camera, lamp=lamp, operator=open_rig.operator, clock=open_rig.clock,
             say=_say,

@@ -151,11 +151,14 @@ def _motor(axis: str, rig: Rig) -> MotorAxis:
     return settings
 
 
-def require_rig(path: Path | None) -> Rig:
-    """Return the rig of a file; raise `InputError` if none is named or it is wrong."""
+def require_rig(path: Path | None, *, calibrated: bool = False) -> Rig:
+    """Return the rig of a file; raise `InputError` if none is named or it is wrong.
+
+    `calibrated`: with the calibration of its camera, if it names one.
+    """
     if path is None:
         raise InputError("name the rig file: --rig FILE")
-    return load_rig(path)
+    return load_rig(path, calibrated=calibrated)
 
 
 def _confirm(rig: Rig, yes: bool, question: str) -> None:

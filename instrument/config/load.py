@@ -55,13 +55,15 @@ class Loaded:
         return None if measured is None else header_text(measured)
 
 
-def load_rig(path: Path) -> Rig:
+def load_rig(path: Path, *, calibrated: bool = False) -> Rig:
     """Read a rig file. Raises `InputError` with every mistake in it.
 
-    The calibration of its camera is for scans, and is not read.
+    The calibration of its camera is read only if asked for: most commands have no use for it.
     """
     file = _read(path, Rig)
     rig = file.check(Rig)
+    if rig is not None and calibrated:
+        rig = _with_calibration(file, rig, None)
     if rig is None or file.found:
         raise InputError(*_report(file))
     return rig

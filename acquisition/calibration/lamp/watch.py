@@ -44,11 +44,13 @@ class Readings:
         return np.asarray(np.sqrt(self.lit.u_mean_dn() ** 2 + own / self.lit.frames))
 
     def u_black_dn(self) -> float:
-        """Return the u of the change of the black level, in DN, from before to after."""
+        """Return the u of the change of the black level, in DN, from before to after.
+
+        Rounding is the same in both, as long as their means are.
+        """
         _, wander = flicker(self.lit, self.dark)
-        noise = float(np.linalg.norm(self.dark.u_mean_dn()))
-        each = wander * float(np.sqrt(np.sum(1 / self.dark.frames)))
-        return float(np.linalg.norm([noise, each, np.ptp(self.dark.mean_dn) / np.sqrt(12)]))
+        each2 = (self.dark.variance_dn2 / self.dark.pixels + wander**2) / self.dark.frames
+        return float(np.sqrt(np.sum(each2) + np.ptp(self.dark.mean_dn) ** 2 / 12))
 
     def fit(self) -> DriftFit:
         """Return the drift of the lamp."""
@@ -83,16 +85,18 @@ class LampWatcher:
         exposure_s = self._set_exposure(patch)
         before = self._darks()
         self.lamp.light()
-        start_s = self.clock.now_s()
-        dark = [level_of(before, patch, start_s)]
+        start_s, linear = self.clock.now_s(), self.plan.rig.camera.linear_dn
+        dark = [level_of(before, patch, start_s, linear)]
         lit = self._watch(patch, start_s, series_in_time(dark, patch))
         self.say(f"uniformity: {PICTURE_FRAMES} frames at {exposure_s:g} s")
-        picture = stack_of(self.camera.grab(PICTURE_FRAMES))
+        picture = stack_of(self.camera.grab(PICTURE_FRAMES), linear)
         after = self._darks()
         self.lamp.light()
-        dark.append(level_of(after, patch, start_s))
+        dark.append(level_of(after, patch, start_s, linear))
         readings = Readings(lit=lit, dark=series_in_time(dark, patch))
-        return Watched(readings=readings, picture=picture, dark_picture=stack_of([*before, *after]))
+        return Watched(
+            readings=readings, picture=picture, dark_picture=stack_of([*before, *after], linear)
+        )
 
     def _place(self) -> str:
         plan = self.plan
@@ -124,7 +128,7 @@ class LampWatcher:
             while True:
                 frames = self.camera.grab(plan.frames)
                 checks.require_unsaturated(frames, patch, plan.rig.camera)
-                levels.append(level_of(frames, patch, start_s))
+                levels.append(level_of(frames, patch, start_s, plan.rig.camera.linear_dn))
                 if len(levels) == 1:
                     light, exposure_s = levels[0][1], frames[0].exposure_s
                     base = float(dark.mean_dn[0])

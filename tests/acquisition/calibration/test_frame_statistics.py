@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from acquisition.calibration.frame_statistics import level_of, series_of, stack_of, table_of
 from instrument.devices import Frame
@@ -26,6 +29,16 @@ def test_mean_and_variance_of_each_pixel_are_exact() -> None:
     assert stack.mean_dn == pytest.approx(whole.mean(axis=0), rel=1e-14)
     assert stack.variance_dn2 == pytest.approx(whole.var(axis=0, ddof=1), rel=1e-12)
     assert (stack.exposure_s, stack.frames) == (0.1, 5)
+
+
+def test_counts_are_made_linear_before_they_are_averaged() -> None:
+    def linear(counts: NDArray[Any]) -> NDArray[Any]:
+        return np.sqrt(counts.astype(np.float64))
+
+    taken, patch = frames(), np.ones((30, 40), dtype=bool)
+    whole = np.stack([linear(frame.image) for frame in taken])
+    assert stack_of(taken, linear).mean_dn == pytest.approx(whole.mean(axis=0), rel=1e-14)
+    assert level_of(taken, patch, 0.0, linear)[1] == pytest.approx(whole.mean(), rel=1e-14)
 
 
 def test_flicker_of_whole_frames_is_no_noise_of_pixels() -> None:

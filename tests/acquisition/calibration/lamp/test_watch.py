@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 import yaml
 
 from acquisition.rig import OpenRig
+from instrument.calibration.camera_file import read_camera_file, write_camera_file
 from instrument.calibration.lamp_file import read_lamp_file
 from instrument.config.simulated.defects import LampDefects
 from sim.defects.lamp import beam_profile
@@ -165,3 +167,29 @@ def test_wrong_input_ends_before_anything_is_measured(
     assert (done.returncode, done.stdout) == (2, "")
     assert words in done.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["there.npz"]
+
+
+def test_a_gamma_that_the_rig_s_calibration_knows_is_taken_out(tmp_path: Path) -> None:
+    """Without it the warm-up looks smaller by the gamma; another camera's is refused."""
+    rig = rig_file(tmp_path, warm_up=0.05, warm_up_s=60.0)
+    own = yaml.safe_load(rig.read_text())
+    own["simulation"]["camera_defects"] = {"gamma": 2.2}
+    rig.write_text(yaml.safe_dump(own))
+    short = ("--minutes", 4, "--within-minutes", 2)
+    bare = value_and_u(calibrated(tmp_path, rig, *short), "warm_up_percent")
+    quick = ("--exposures", "18", "--frames", "2")
+    done = gonio("calibrate", "camera", "--rig", rig, "-o", tmp_path / "c.npz", *quick)
+    assert done.returncode == 0, done.stderr
+    own["camera"]["calibration"] = "c.npz"
+    rig.write_text(yaml.safe_dump(own))
+    (tmp_path / "l.npz").unlink()
+    value, u = value_and_u(calibrated(tmp_path, rig, *short), "warm_up_percent")
+    late = 100 * 0.05 * float(np.exp(-2 / 60))
+    assert value == pytest.approx(late, abs=4 * u + 0.03 * late)
+    assert value / bare[0] == pytest.approx(2.2, rel=0.1)
+    other = replace(read_camera_file(tmp_path / "c.npz"), camera="Other camera 7")
+    write_camera_file(tmp_path / "c.npz", other)
+    done = gonio("calibrate", "lamp", "--rig", rig, "-o", tmp_path / "m.npz")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "c.npz: is the calibration of 'Other camera 7'" in done.stderr
+    assert not (tmp_path / "m.npz").exists()
