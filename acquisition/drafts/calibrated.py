@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -12,15 +13,17 @@ from instrument.calibration.camera_calibration import CameraCalibration
 from instrument.calibration.camera_file import read_camera_file
 from instrument.calibration.lamp_file import read_lamp_file
 from instrument.calibration.quantity import Quantity
+from instrument.config.camera import CameraConfig
 from instrument.errors import InputError
 
-_LEAST = {"u_black_level_dn": 0.0, "dark_current_electrons_per_s": 0.0, "u_flicker": 0.0}
-_KEYS = {  # of a rig file: key of the calibration's quantity, unit for people, and factor
-    "read_noise_electrons": ("dark_noise_electrons", "e-", 1.0),
-    "dark_current_electrons_per_s": ("dark_current_electrons_per_s", "e-/s", 1.0),
-    "black_level_dn": ("dark_dn", "DN", 1.0),
-    "u_black_level_dn": ("black_wander_dn", "DN", 1.0),
-    "u_flicker": ("flicker_percent", "", 0.01),
+USUAL_WANDER_DN = CameraConfig.model_fields["u_black_level_dn"].default
+_LEAST = {"u_black_level_dn": USUAL_WANDER_DN, "dark_current_electrons_per_s": 0.0}
+"""Least values. A wander has no u: a smaller one, of a few minutes, would raise false alarms."""
+_KEYS = {  # of a rig file: key of the calibration's quantity
+    "read_noise_electrons": "dark_noise_electrons",
+    "dark_current_electrons_per_s": "dark_current_electrons_per_s",
+    "black_level_dn": "dark_dn",
+    "u_black_level_dn": "black_wander_dn",
 }
 
 
@@ -58,15 +61,20 @@ class Calibrated:
         Quantities that the calibration did not determine are left out.
         """
         values = {}
-        for key, (name, unit, factor) in _KEYS.items():
+        for key, name in _KEYS.items():
             quantity = self.found.quantities.get(name)
             if quantity is not None and quantity.value is not None:
-                value = max(factor * quantity.value, _LEAST.get(key, -1e9))
-                values[key] = float(f"{value:.5g}"), _measured(quantity, unit)
+                least = _LEAST.get(key, -math.inf)
+                above = "" if quantity.value >= least else "the least; "
+                value = max(quantity.value, least)
+                values[key] = float(f"{value:.5g}"), above + _measured(quantity)
+        flicker = self.found.quantities.get("flicker_percent")
+        if flicker is not None and flicker.value is not None:
+            values["u_flicker"] = _flicker(flicker)
         gain = self.found.quantities.get("gain_dn_per_electron")
         if gain is not None and gain.value and "black_level_dn" in values:
             well = (max_dn - values["black_level_dn"][0]) / gain.value
-            comment = f"measured: full scale over the gain of {_measured(gain, 'DN/e-', '')}"
+            comment = f"measured: full scale over the gain of {_value_text(gain)}"
             values["full_well_electrons"] = float(f"{well:.5g}"), comment
         return values
 
@@ -76,8 +84,13 @@ def lamp_flicker(path: Path) -> tuple[float, str]:
     flicker = read_lamp_file(path).quantities.get("flicker_percent")
     if flicker is None or flicker.value is None:
         raise InputError(f"{path}: holds no flicker. Calibrate again")
-    found = Estimate(0.01 * flicker.value, 0.01 * (flicker.u or 0.0))
-    return proposed_flicker(found), f"{_measured(flicker, '%')}, rounded up"
+    return _flicker(flicker)
+
+
+def _flicker(flicker: Quantity) -> tuple[float, str]:
+    """Return `u_flicker`, not below what some minutes can tell, and its comment."""
+    found = Estimate(0.01 * (flicker.value or 0.0), 0.01 * (flicker.u or 0.0))
+    return proposed_flicker(found), f"{_measured(flicker)}, rounded up"
 
 
 @lru_cache(maxsize=2)
@@ -85,7 +98,10 @@ def _read(path: Path, stamp: int) -> CameraCalibration:  # noqa: ARG001 - a new 
     return read_camera_file(path)
 
 
-def _measured(quantity: Quantity, unit: str, word: str = "measured: ") -> str:
-    own = quantity.unit or unit
+def _measured(quantity: Quantity) -> str:
+    return f"measured: {_value_text(quantity)}"
+
+
+def _value_text(quantity: Quantity) -> str:
     spread = f" ± {quantity.u:.2g}" if quantity.u is not None else ""
-    return f"{word}{quantity.value:.5g}{spread} {own}".rstrip()
+    return f"{quantity.value:.5g}{spread} {quantity.unit}".rstrip()

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from acquisition.drafts.axis_questions import USUAL, connection
-from acquisition.drafts.calibrated import Calibrated, lamp_flicker
+from acquisition.drafts.calibrated import USUAL_WANDER_DN, Calibrated, lamp_flicker
 from acquisition.drafts.question import Answers, number_of
 from acquisition.drafts.rig_questions import DEPTHS, NONE, Bench, is_simulated, size_px
 from acquisition.drafts.yaml_words import in_comment, line
@@ -139,7 +139,7 @@ def _sensor(bench: Bench, answers: Answers) -> Iterator[str]:
         "read_noise_electrons": (_READ_NOISE, _ASSUMED),
         "dark_current_electrons_per_s": (20.0, _ASSUMED),
         "black_level_dn": (_black_dn(answers), _ASSUMED),
-        "u_black_level_dn": (0.25, "assumed: of the black level, from frame to frame"),
+        "u_black_level_dn": (USUAL_WANDER_DN, "assumed: of the black level, from frame to frame"),
     }
     values |= {k: v for k, v in _calibrated(bench, answers).items() if k in values}
     if answers["calibration"] != NONE:

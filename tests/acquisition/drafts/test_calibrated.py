@@ -31,11 +31,11 @@ FOUND = {
     "dark_current_electrons_per_s": (-0.5, 1.0, "e-/s"),  # none, within its u
     "dark_dn": (100.0, 0.01, "DN"),
     "flicker_percent": (0.07, None, "%"),
-    "black_wander_dn": (None, None, "DN"),
+    "black_wander_dn": (0.001, None, "DN"),  # of a few minutes: no reason for an alarm
 }
 
 
-def calibration_file(path: Path, max_dn: float = 4095.0, **changed: float) -> Path:
+def calibration_file(path: Path, max_dn: float = 4095.0, **changed: float | None) -> Path:
     """A calibration of a camera with 64 x 48 pixels."""
     found = {k: (changed.get(k, value), u, unit) for k, (value, u, unit) in FOUND.items()}
     quantities = {
@@ -106,11 +106,21 @@ def test_a_rig_file_holds_what_the_calibration_found(tmp_path: Path) -> None:
     assert camera["read_noise_electrons"] == 6.25
     assert camera["dark_current_electrons_per_s"] == 0.0
     assert camera["black_level_dn"] == 100.0
-    assert camera["u_black_level_dn"] == 0.25  # not determined: the usual value
+    assert camera["u_black_level_dn"] == 0.25  # the least
     assert 1 / rig.camera.electrons_per_dn == pytest.approx(0.2, rel=1e-4)
     assert rig.lamp.u_flicker == pytest.approx(0.0007)
+    assert "# the least; measured: 0.001 DN" in path.read_text()
     assert "# measured: 6.25 ± 0.04 e-" in path.read_text()
     assert r"# Calibration of Maker M1\n#7, 2026-11-27" in path.read_text()
+
+
+def test_what_was_not_determined_keeps_its_usual_value(tmp_path: Path) -> None:
+    """Behind a gamma, noise and dark current cannot be told."""
+    calibration_file(tmp_path / "c.npz", dark_noise_electrons=None, gain_dn_per_electron=None)
+    text = rig_text(tmp_path)
+    camera = yaml.safe_load(text)["camera"]
+    assert (camera["read_noise_electrons"], camera["full_well_electrons"]) == (8.0, 30000.0)
+    assert "# assumed: gonio calibrate camera measures it" in text
 
 
 @pytest.mark.parametrize(

@@ -68,6 +68,40 @@ def test_a_node_for_metadata_is_left_out_and_no_odd_device_ends_the_list(
     assert "several planes, which this program cannot use" in planes.splitlines()[0]
 
 
+def test_cameras_for_pictures_are_found_with_formats_exposure_and_gain(
+    remote: RemoteCamera, scene: LevelScene
+) -> None:
+    with served(remote, scene, formats=("YUYV", "GREY")) as camera:
+        (found,) = remote.ask("found_cameras", "/dev/null", DEVICE, "/dev/video77")
+        assert camera.requests["S_FMT"] == camera.requests["S_CTRL"] == 0  # nothing is changed
+    assert dict(found.formats)["GREY"] == ("640 x 480", "512 x 480", "64 x 48")
+    assert (found.exposure.minimum, found.exposure.maximum) == (1, 100_000)
+    assert (found.gain.value, found.gain.step) == (100, 10)
+    with served(remote, scene, node=ioctl.MULTI_PLANAR):
+        assert remote.ask("found_cameras", DEVICE) == []
+
+
+@pytest.mark.parametrize(
+    ("formats", "quantization", "limited"),
+    [
+        (("YUYV",), ioctl.FULL_RANGE, False),
+        (("YUYV",), ioctl.LIMITED_RANGE, True),
+        (("YUYV",), ioctl.DEFAULT_RANGE, True),  # the rule of linux/videodev2.h
+        (("GREY",), ioctl.FULL_RANGE, None),
+    ],
+)
+def test_the_range_of_yuyv_is_read(
+    formats: tuple[str, ...],
+    quantization: int,
+    limited: bool | None,
+    remote: RemoteCamera,
+    scene: LevelScene,
+) -> None:
+    with served(remote, scene, formats=formats, quantization=quantization):
+        (found,) = remote.ask("found_cameras", DEVICE)
+    assert found.limited_range is limited
+
+
 def test_a_big_endian_format_is_listed(remote: RemoteCamera, scene: LevelScene) -> None:
     with served(remote, scene, big_endian=True, formats=("Y16", "GREY")):
         _, *lines = remote.ask("describe", DEVICE).splitlines()

@@ -98,6 +98,9 @@ class Child:
     def descriptions(self, *devices: str) -> list[str]:
         return listing.descriptions(devices)
 
+    def found_cameras(self, *devices: str) -> list[listing.FoundCamera]:
+        return listing.found_cameras(devices)
+
     def serve_here(self, settings: V4l2Settings, socket: str) -> list[tuple[int, float]]:
         """Device model and OpenCV in one process: counts and exposures of a few frames."""
         from sim.emulated.v4l2.device import EmulatedCamera, Exposure
