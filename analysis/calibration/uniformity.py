@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from instrument.geometry import BoolArray, FloatArray, IntArray, lamp_direction
 
 LOWEST_ORDER, HIGHEST_ORDER = 1, 4  # no light is even of which only the mean is known
 CELLS = 16  # a side of the area
+_FINER = 2  # orders: a beam that is symmetrical shows no more in the next one
 _LEAST_FILLED = 0.6  # of the cells: a polynomial is not extrapolated far
 _GRID = 33  # points a side, at which extremes are looked for
 
@@ -33,7 +34,8 @@ class UniformityFit:
 
     exponents: (terms, 2), i and j. coefficients: (terms,). covariance: (terms, terms), of the
     scatter about the fit. half_mm: half of the side of the area. residual: rms of the cells about
-    the fit, relative.
+    the fit, relative. finer: polynomial of an order higher by `_FINER`, which shows what is missing
+    in this one; None in that one itself.
     """
 
     exponents: IntArray
@@ -41,6 +43,7 @@ class UniformityFit:
     covariance: FloatArray
     half_mm: float
     residual: float
+    finer: UniformityFit | None = None
 
     @property
     def order(self) -> int:
@@ -52,14 +55,19 @@ class UniformityFit:
         return np.asarray(_terms(x_mm, y_mm, self.half_mm, self.exponents) @ self.coefficients)
 
     def peak_to_valley(self, side_mm: float) -> Estimate:
-        """Return the largest less the smallest light in a square about the axis, relative."""
+        """Return the largest less the smallest light in a square about the axis, relative.
+
+        Its u holds the difference from that of the finer polynomial.
+        """
         steps = np.linspace(-side_mm / 2, side_mm / 2, _GRID)
         x, y = (values.ravel() for values in np.meshgrid(steps, steps))
         terms = _terms(x, y, self.half_mm, self.exponents)
         light = terms @ self.coefficients
         apart = terms[int(np.argmax(light))] - terms[int(np.argmin(light))]
-        u = float(np.sqrt(apart @ self.covariance @ apart))
-        return Estimate(float(np.ptp(light)), u)
+        value, u = float(np.ptp(light)), float(np.sqrt(apart @ self.covariance @ apart))
+        if self.finer is None:
+            return Estimate(value, u)
+        return Estimate(value, float(np.hypot(u, self.finer.peak_to_valley(side_mm).value - value)))
 
 
 def irradiance(
@@ -105,7 +113,8 @@ def cells_of(points_mm: FloatArray, light: FloatArray, used: BoolArray, side_mm:
 def fit_uniformity(cells: Cells) -> UniformityFit:
     """Return the polynomial with the lowest Bayesian information criterion (Schwarz 1978)."""
     fits = [_fit(cells, order) for order in range(LOWEST_ORDER, HIGHEST_ORDER + 1)]
-    return min(fits, key=lambda scored: scored[0])[1]
+    best = min(fits, key=lambda scored: scored[0])[1]
+    return replace(best, finer=_fit(cells, best.order + _FINER)[1])
 
 
 def _fit(cells: Cells, order: int) -> tuple[float, UniformityFit]:

@@ -15,8 +15,9 @@ from instrument.geometry import BoolArray, FloatArray
 _LEAST_LIGHT = 0.05  # of full scale
 _MOST_SATURATED = 0.001  # of the window's pixels: hot ones may be
 _DEAD = 0.1  # of the light before: no lamp that is on loses more between two readings
-_JUMP_U = 6.0  # of the noise: none of 180 readings of 1000 calibrations
-_MEDIAN = 1.5  # of the median scatter of few frames, to that of many, at most
+_JUMP_U = 6.0  # times the noise of a second difference: none of 180 readings of 1000 calibrations
+_MEDIAN = 1.5  # times a median deviation is a standard deviation; of two frames it is 1.5 too
+_FEW = 6  # readings: with fewer of them the median of their scatter says too little
 _AGAIN = "look at the lamp and its supply, and calibrate again. No file is written"
 
 
@@ -68,16 +69,27 @@ def require_lamp(readings: LevelSeries, signal_dn: FloatArray) -> None:
     changes = np.diff(signal_dn) / signal_dn[:-1]
     if changes.size < 2:
         return
-    noise = _MEDIAN * float(np.sqrt(np.median(readings.scatter_dn2) / readings.frames[0])) / before
-    unrest = float(np.median(np.abs(np.diff(changes)))) if changes.size >= 6 else 0.0
-    limit = max(MIN_JUMP, _JUMP_U * float(np.sqrt(2)) * noise, _JUMP_U * unrest)
-    limit += 2 * abs(float(changes[-2]))
+    noise = np.sqrt(6) * _noise_dn(readings) / before  # of a second difference
+    unrest = _MEDIAN * float(np.median(np.abs(np.diff(changes)))) if changes.size >= _FEW else 0.0
+    limit = max(MIN_JUMP, _JUMP_U * noise, _JUMP_U * unrest) + 2 * abs(float(changes[-2]))
     if abs(changes[-1]) > limit:
         raise DeviceError(
             f"lamp: its light jumped by {100 * changes[-1]:+.3g} % between {readings.age_s[-2]:.0f}"
             f" and {readings.age_s[-1]:.0f} s after the start; expected: at most "
             f"{100 * limit:.2g} %. Did somebody pass, or touch the tile? Otherwise {_AGAIN}"
         )
+
+
+def _noise_dn(readings: LevelSeries) -> float:
+    """Return the noise of a reading in DN, by the scatter of its frames.
+
+    The median is used, which a lamp that jumps within a reading does not move.
+    """
+    variances = readings.scatter_dn2 / readings.frames
+    if variances.size < _FEW:
+        freedom = float(np.sum(readings.frames - 1))
+        return float(np.sqrt(variances.mean())) * (1 + 3 / freedom)  # few are often too small
+    return _MEDIAN * float(np.sqrt(np.median(variances)))
 
 
 def require_lit_tile(light: FloatArray, side_mm: float) -> None:

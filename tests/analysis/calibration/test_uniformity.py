@@ -62,3 +62,20 @@ def test_a_tile_that_the_picture_hardly_shows_is_refused() -> None:
     seen = points[points[:, 0] > 5]
     with pytest.raises(NotDetermined, match=r"shows 3\d % of the tile's square of 45 mm"):
         cells(np.ones(len(seen)), seen)
+
+
+def test_the_u_covers_beams_that_are_no_polynomial() -> None:
+    rng, points, pulls = np.random.default_rng(8), pixels(0.8), []
+    grid = np.stack(np.meshgrid(*2 * [np.linspace(-10, 10, 33)]), axis=-1).reshape(-1, 2)
+    for _ in range(25):
+        aim, fwhm_mm = rng.normal(0, 4, 2), rng.uniform(70, 200)
+
+        def beam(at: FloatArray, aim: FloatArray = aim, fwhm: float = fwhm_mm) -> FloatArray:
+            return np.asarray(np.exp2(-4 * ((at - aim) ** 2).sum(axis=1) / fwhm**2))
+
+        light = beam(points) * (1 + 0.01 * rng.standard_normal(len(points)))
+        found = fit_uniformity(cells(light, points)).peak_to_valley(20.0)
+        true = np.ptp(beam(grid)) / beam(np.zeros((1, 2)))[0]
+        assert found.value == pytest.approx(true, rel=0.05, abs=1e-3)
+        pulls.append((found.value - true) / found.u)
+    assert np.sqrt(np.mean(np.square(pulls))) < 1.6
