@@ -7,7 +7,9 @@ import pytest
 
 from analysis.calibration.level_series import (
     ROUNDING_DN2,
+    LevelSeries,
     flicker,
+    flicker_estimate,
     rounding_of_mean_dn,
     rounding_of_variance_dn2,
     unsaturated,
@@ -37,6 +39,27 @@ def test_flicker_and_wander_are_those_of_the_frames() -> None:
     relative, wander = flicker(lit.chosen(np.arange(21)), dark)
     assert relative == pytest.approx(0.002, rel=0.3)
     assert wander < 0.02
+
+
+@pytest.mark.parametrize("true", [0.0, 0.001, 0.004])
+def test_the_u_of_a_flicker_is_its_spread_over_series(true: float) -> None:
+    """Scatter of frames' means about 1500 DN; pixel noise alone gives 0.3 DN."""
+    rng, found = np.random.default_rng(12), []
+    for _ in range(150):
+        own = np.hypot(0.3, true * 1500) * rng.standard_normal((40, 4))
+        series = LevelSeries(
+            exposure_s=np.ones(40), mean_dn=np.full(40, 1564.0), variance_dn2=np.full(40, 360.0),
+            scatter_dn2=own.var(axis=1, ddof=1), frames=np.full(40, 4.0), age_s=np.arange(40.0),
+            pixels=4000,
+        )  # fmt: skip
+        found.append(flicker_estimate(series, 0.0, 64.0))
+    values, us = np.array(found).T
+    if true == 0:
+        assert np.all(values < 2.5 * us)
+        assert values.max() < 2e-4
+    else:
+        assert values.mean() == pytest.approx(true, rel=0.02)
+        assert np.std(values) == pytest.approx(us.mean(), rel=0.2)
 
 
 @pytest.mark.parametrize("well", [30_000.0, 20_000.0])

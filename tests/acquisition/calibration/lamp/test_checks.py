@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,3 +56,15 @@ def test_a_shadow_on_the_tile_is_refused() -> None:
     require_lit_tile(np.linspace(0.6, 1.1, 100), 45.0)
     with pytest.raises(NotDetermined, match="the light falls to 10 % of the usual; needed: 50 %"):
         require_lit_tile(np.where(np.arange(100) < 10, 0.1, 1.0), 45.0)
+
+
+def test_the_noise_of_few_readings_of_two_frames_is_no_jump() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(2000):
+        frames = 1500 * (1 + 0.01 * rng.standard_normal((5, 2)))
+        signal, scatter = frames.mean(axis=1), frames.var(axis=1, ddof=1)
+        for end in (3, 4, 5):
+            taken = replace(
+                readings(signal[:end], 0.0), scatter_dn2=scatter[:end], frames=np.full(end, 2.0)
+            )
+            require_lamp(taken, signal[:end])
