@@ -53,13 +53,18 @@ def calibrate_camera(
         print_lines(plan.lines())
         return
     path = _require_path(path, "camera")
-    if rig.real:
-        require_terminal(str(rig_path))
-    restart_for_emulated_camera(rig)
+    _require_somebody(rig, rig_path)
     with orderly_end():
         calibration = _measured(plan)
         written = write_camera_file(path, calibration)
     _print(written, rig, path, as_json)
+
+
+def _require_somebody(rig: Rig, rig_path: Path | None) -> None:
+    """Refuse a real rig without a terminal; start again where the camera is an emulated one."""
+    if rig.real:
+        require_terminal(str(rig_path))
+    restart_for_emulated_camera(rig)
 
 
 def _require_path(path: Path | None, device: str) -> Path:
@@ -125,9 +130,7 @@ def calibrate_lamp(
         print_lines(plan.lines())
         return
     path = _require_path(path, "lamp")
-    if rig.real:
-        require_terminal(str(rig_path))
-    restart_for_emulated_camera(rig)
+    _require_somebody(rig, rig_path)
     with orderly_end():
         written = write_lamp_file(path, _watched(plan, rig_path or Path()))
     if as_json:
