@@ -150,7 +150,7 @@ def _tile_note(reduced: Reduced, loaded: Loaded) -> str:
     if tile.certificate is None:
         return (
             "the white tile is assumed to be Lambertian; sintered PTFE is not, by some 4 % at 30 "
-            "and 60 deg and 7 % at 0 and 70 deg: state its `certificate` or a `table`"
+            "and 60 deg and 7 % at 0 and 70 deg: state its certificate or a table in the protocol"
         )
     if tile.certificate == "lambertian":
         return "the white tile is Lambertian by its certificate in the protocol"
@@ -158,7 +158,7 @@ def _tile_note(reduced: Reduced, loaded: Loaded) -> str:
         return f"the white tile's number is used at its certificate's geometry, {tile.certificate}"
     return (
         f"the white tile's number is certified at {tile.certificate} and used elsewhere: a u of "
-        f"{_span(100 * found.departure)} % is added; a `table` of its radiance factor has less"
+        f"{_span(100 * found.departure)} % is added; a table of its radiance factor has less"
     )
 
 

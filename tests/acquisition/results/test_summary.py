@@ -63,7 +63,7 @@ def test_notes_name_the_simulation_the_tile_and_the_camera_s_rounding(results: R
     [
         ({"certificate": "lambertian"}, "the white tile is Lambertian by its certificate in the"),
         ({"certificate": "8/hemispherical"}, "certified at 8/hemispherical and used elsewhere: a u"
-         " of 4 % is added; a `table`"),
+         " of 4 % is added; a table"),
         ({"certificate": "45/0"}, "certified at 45/0 and used elsewhere: a u of 4 % is added"),
         ({}, "the white tile is assumed to be Lambertian; sintered PTFE is not, by some 4 % at 30"),
     ],
