@@ -27,16 +27,21 @@ def small_scan(rig: str = "bench_12bit", shrink: int = 5) -> Loaded:
         white_tile=WhiteTile(reflectance=0.99, u_reflectance=0.005, theta_r_deg=10.0, frames=4),
         drift_check=DriftCheck(theta_r_deg=10.0, every_points=4),
     )
-    camera = demo.rig.camera
+    return changed(shrunk(demo, shrink), sweeps=[sweep], references=references)
+
+
+def shrunk(loaded: Loaded, times: int) -> Loaded:
+    """Copy of the configuration with 1/times of the camera's rows and columns."""
+    camera = loaded.rig.camera
     small = camera.model_copy(
         update={
-            "width_px": camera.width_px // shrink,
-            "height_px": camera.height_px // shrink,
-            "axis_row_px": camera.axis_row_px / shrink,
-            "axis_column_px": camera.axis_column_px / shrink,
+            "width_px": camera.width_px // times,
+            "height_px": camera.height_px // times,
+            "axis_row_px": camera.axis_row_px / times,
+            "axis_column_px": camera.axis_column_px / times,
         }
     )
-    return changed(demo, rig={"camera": small}, sweeps=[sweep], references=references)
+    return changed(loaded, rig={"camera": small})
 
 
 def undated(readings: list[Reading]) -> list[Reading]:

@@ -165,7 +165,8 @@ def test_leaving_out_dead_pixels_changes_the_mean_within_the_stated_uncertainty(
         measure([Frame(i.astype(np.uint16), 1.0, 0.0)] * frames, dark, WINDOW, CAMERA, ON_AXIS, 100)
         for i in (image, dead_image)
     )
-    assert abs(spoilt.signal_dn - clean.signal_dn) <= 3 * max(spoilt.u_texture_dn, 1e-9)
+    # A single pixel of a normal texture is beyond 6 u once in 5e8.
+    assert abs(spoilt.signal_dn - clean.signal_dn) <= 6 * max(spoilt.u_texture_dn, 1e-9)
     assert spoilt.flags == ""
 
 

@@ -21,7 +21,7 @@ from instrument.config.protocol import (
 from instrument.config.rig import Rig
 from sim.faults.faults import Faults
 from tests.support.paths import CONFIGS
-from tests.support.scans import changed
+from tests.support.scans import changed, shrunk
 from tests.support.whole_scans.simulated_rig import simulated
 
 RIGS = ("bench_12bit", "paper_1995", "emulated")
@@ -47,7 +47,7 @@ def random_scan(
     kind: of the sample, one of `KINDS`. shrink: rows and columns of the camera are divided by it.
     """
     random = np.random.default_rng([seed, zlib.crc32(rig.encode())])
-    base = _base(rig)
+    base = shrunk(_base(rig), shrink)
     sweep = {
         "theta_i_deg": sorted(
             random.choice([0.0, 20, 30, 45, 60, 70], random.integers(1, 3), False)
@@ -59,7 +59,7 @@ def random_scan(
     side_mm = float(random.choice([10.0, 20, 30]))
     return changed(
         base,
-        rig=_rig(base.rig, random, seed, shrink),
+        rig=_rig(base.rig, random, seed),
         sweeps=[sweep],
         window=PatchConfig(width_mm=side_mm, height_mm=side_mm),
         frames_per_point=frames,
@@ -79,15 +79,8 @@ def _view_angles(random: np.random.Generator) -> list[float]:
     ]
 
 
-def _rig(rig: Rig, random: np.random.Generator, seed: int, shrink: int) -> dict[str, object]:
-    camera = rig.camera.model_copy(
-        update={
-            "width_px": rig.camera.width_px // shrink,
-            "height_px": rig.camera.height_px // shrink,
-            "axis_row_px": rig.camera.axis_row_px / shrink,
-            "axis_column_px": rig.camera.axis_column_px / shrink,
-        }
-    )
+def _rig(rig: Rig, random: np.random.Generator, seed: int) -> dict[str, object]:
+    camera = rig.camera
     hot = [
         HotPixel(
             row=int(random.integers(camera.height_px)),
@@ -110,7 +103,7 @@ def _rig(rig: Rig, random: np.random.Generator, seed: int, shrink: int) -> dict[
             "camera_defects": defects,
         }
     )
-    return {"camera": camera, "simulation": simulation}
+    return {"simulation": simulation}
 
 
 def _references(random: np.random.Generator, again_at_end: bool) -> References:
