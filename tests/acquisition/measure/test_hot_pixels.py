@@ -90,7 +90,7 @@ def test_leaving_out_hot_pixels_changes_the_mean_within_the_stated_uncertainty(
         for i, d in ((image, clean_dark), (hot_image, hot_dark))
     )
     # A pixel at a corner of the crop may be outside the window, which then stays the same.
-    assert abs(spoilt.signal_dn - clean.signal_dn) <= 4 * spoilt.u_texture_dn
+    assert abs(spoilt.signal_dn - clean.signal_dn) <= 6 * spoilt.u_texture_dn
     assert spoilt.flags == clean.flags == ""
     assert spoilt.window_pixels <= clean.window_pixels
 
