@@ -22,7 +22,9 @@ from tests.support.stages.kinds import SERIAL
 
 pytestmark = pytest.mark.waits
 
-BOUND_S = 3.0
+# On a dead line: 0.5 s without a status, then a stop that is tried for 1 s. Each ends with what has
+# begun, and reading the status of an AZ drive takes another second where its line is not in step.
+BOUND_S = 4.0
 
 # One spoilt answer, then none: the stage must recover, whatever it was doing.
 ONCE = {
