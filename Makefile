@@ -11,7 +11,7 @@ WAITING = $(shell grep -rl --include='test_*.py' 'pytest\.mark\.waits' tests)
 demo: $(VENV)/.installed
 	$(BIN)/gonio run configs/protocols/demo.yaml
 
-# Tests that wait for emulated devices leave the processor to the linters.
+# Tests that wait for emulated devices leave most of the processor to the linters, which yield it.
 test: $(VENV)/.installed-dev
 	$(MAKE) --no-print-directory -j 2 --output-sync=target lint waiting
 	$(BIN)/pytest -n auto --dist worksteal -m "not hil and not waits"
@@ -26,7 +26,7 @@ hil-emulated: $(VENV)/.installed-dev
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
+	nice $(BIN)/mypy
 	$(BIN)/lint-imports
 
 $(VENV)/bin/python:

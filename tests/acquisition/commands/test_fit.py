@@ -221,6 +221,9 @@ def test_a_run_and_its_table_are_fitted_as_at_the_run_s_end(
     """Fits of the folder follow the protocol's `fit:`; a table has the numbers alone."""
     protocol = small_demo(tmp_path)
     text = protocol.read_text() + block + "\n"
+    if "qualitative" in block:  # a sample that this method explains: else the whole ladder is tried
+        text = text.replace("oren_nayar+torrance_sparrow", "oren_nayar_qualitative")
+        text = text.replace(", ks: 0.076", "")
     protocol.write_text(text if tile else re.sub(r"  white_tile:.*\n", "", text))
     done = gonio("run", protocol, "--out", tmp_path / "run", "--json")
     at_end = json.loads(done.stdout)

@@ -112,7 +112,7 @@ def random_case(seed: int) -> tuple[Loaded, int | None, Loaded]:
 def test_the_table_holds_exactly_what_the_fit_takes(tmp_path: Path, slow: bool) -> None:
     """Every number, group and name; random protocols and seeds, stopped, resumed, flagged."""
     kinds = set()
-    for seed in range(200 if slow else 12):
+    for seed in range(200 if slow else 6):
         loaded, stop, resumed = random_case(seed)
         with Record.create(tmp_path / str(seed), {}) as record:
             scan(loaded, record, stop)

@@ -13,7 +13,7 @@ from tests.support.scans import small_demo
 from tests.support.whole_scans.struck_command import struck
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP)
-TRIALS, SLOW_TRIALS = 12, 240
+TRIALS, SLOW_TRIALS = 8, 240
 SHARE = ("help", "models", "help", "models", "fit", "help", "models", "fit", "report", "run")
 # Seconds of computing that each command takes on a quick machine; a moment may come after its end.
 COMPUTING_S = {"help": 0.12, "models": 0.5, "fit": 1.2, "report": 2.0, "run": 2.5}

@@ -20,7 +20,7 @@ def nothing_lost(outcome: dict[str, int]) -> bool:
 def test_nothing_is_lost_or_changed_by_kills_at_random_moments(
     tmp_path: Path, slow: bool, record_testsuite_property: Callable[[str, object], None]
 ) -> None:
-    kills = 1000 if slow else 25
+    kills = 1000 if slow else 15
     outcome = json.loads(run_scan_killer([tmp_path, kills, 2026], {}, 3600))
     record_testsuite_property("kills at random moments", outcome)
     assert outcome["kills"] >= kills
@@ -37,7 +37,7 @@ def test_nothing_is_lost_or_changed_by_kills_before_each_file_operation(
     record_testsuite_property: Callable[[str, object], None],
 ) -> None:
     """Each write, fsync, rename and removal of a scan, those of SQLite's log included."""
-    stride = 1 if slow else 23
+    stride = 1 if slow else 37
     environment = recorder | {"GONIO_RECORD_ROOT": str(tmp_path)}
     outcome = json.loads(run_scan_killer([tmp_path, "entries", stride], environment, 3600))
     record_testsuite_property("kills before each entry", outcome)

@@ -110,7 +110,7 @@ def test_a_fuzzed_protocol_is_read_or_refused_with_its_position(slow: bool, tmp_
             assert first_unfit(loaded.protocol.name + loaded.protocol.sample.name) is None
 
     examples = [PROTOCOL.encode(), *shipped("protocols")]
-    feed(YamlMutator(examples, 1, YAML_WORDS), 10_000 if slow else 70, read)
+    feed(YamlMutator(examples, 1, YAML_WORDS), 10_000 if slow else 40, read)
 
 
 @pytest.mark.slow
@@ -126,7 +126,7 @@ def test_a_fuzzed_rig_is_read_or_refused_with_its_position(slow: bool, tmp_path:
                 assert _PLACE.match(line.removeprefix(str(path)))
 
     examples = [RIG.encode(), *shipped("rigs")]
-    feed(YamlMutator(examples, 2, YAML_WORDS), 10_000 if slow else 70, read)
+    feed(YamlMutator(examples, 2, YAML_WORDS), 10_000 if slow else 40, read)
 
 
 @pytest.mark.slow
@@ -145,7 +145,7 @@ def test_a_fuzzed_table_is_read_or_refused_with_its_position(slow: bool, tmp_pat
         assert m.u_random is None or np.all(m.u_random > 0)
 
     examples = [text.encode() for text in (PLAIN, BARE, RUN_CSV)]
-    feed(Mutator(examples, 3, CSV_WORDS), 10_000 if slow else 500, read)
+    feed(Mutator(examples, 3, CSV_WORDS), 10_000 if slow else 300, read)
 
 
 @pytest.mark.slow

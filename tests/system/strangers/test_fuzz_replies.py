@@ -129,7 +129,7 @@ class Session:
 def test_damaged_replies_give_the_true_position_or_an_error(
     kind: str, slow: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    session, count = Session.of(kind, monkeypatch), 10_000 if slow else 120
+    session, count = Session.of(kind, monkeypatch), 10_000 if slow else 70
     feed(lambda number: str(number).encode(), count, lambda data: session.take(int(data)))
     if kind == "zaber":
         assert session.wrong <= count / 256
@@ -233,7 +233,7 @@ def test_newport_framing_reads_any_line(slow: bool) -> None:
             _or_garbled(lambda text=text: newport_framing.number("stage", "TP", text), _finite)
             _or_garbled(lambda text=text: newport_framing.state("stage", text), _state)
 
-    feed(Mutator(_NEWPORT, 3), FRAMED if slow else 1000, read)
+    feed(Mutator(_NEWPORT, 3), FRAMED if slow else 600, read)
 
 
 def _or_garbled(read: Callable[[], object], check: Callable[[object], None]) -> None:
