@@ -12,8 +12,8 @@ from instrument.config.rig import Rig
 from instrument.devices import Frame
 from instrument.errors import DeviceError, NotDetermined
 
-SATURATED = 0.98  # of the largest count, as in a scan
-_MOST_SATURATED = 0.001  # of the pixels: hot ones may be
+SATURATED = 0.98  # of the largest count
+MOST_SATURATED = 0.001  # of the pixels: hot ones may be
 _WARM = 20.0  # times the stated dark current, which is not known before it is calibrated
 _STRONGEST_GAMMA = 2.4  # of video curves: that of sRGB above its linear part (IEC 61966-2-1)
 _WANDER_DN = 2.0  # of the black level between exposures, and rounding
@@ -46,10 +46,10 @@ def require_unsaturated(frames: Sequence[Frame], rig: Rig) -> None:
     """Raise `NotDetermined` if pixels of the flat field are saturated."""
     image, camera = frames[0].image, rig.camera
     count = int(np.count_nonzero(image >= SATURATED * camera.max_dn))
-    if count > _MOST_SATURATED * image.size:
+    if count > MOST_SATURATED * image.size:
         raise NotDetermined(
             f"camera: {count} of {image.size} pixels of the flat field are saturated at "
-            f"{frames[0].exposure_s:g} s; allowed: {100 * _MOST_SATURATED:g} %. Take less light, "
+            f"{frames[0].exposure_s:g} s; allowed: {100 * MOST_SATURATED:g} %. Take less light, "
             "turn gloss out of the picture, or lower min_exposure_s if the camera can do less"
         )
 

@@ -61,7 +61,12 @@ def level_of(
 def series_of(levels: Sequence[Level], pixels: int) -> LevelSeries:
     """Return levels in the order of rising exposure, of equal exposures the first."""
     kept = {level[0]: level for level in reversed(levels)}
-    columns: FloatArray = np.array([kept[exposure] for exposure in sorted(kept)]).T
+    return series_in_order([kept[exposure] for exposure in sorted(kept)], pixels)
+
+
+def series_in_order(levels: Sequence[Level], pixels: int) -> LevelSeries:
+    """Return levels in the order in which they are given."""
+    columns: FloatArray = np.array(levels).T
     return LevelSeries(
         exposure_s=columns[0], mean_dn=columns[1], variance_dn2=columns[2],
         scatter_dn2=columns[3], frames=columns[4], age_s=columns[5], pixels=pixels,

@@ -109,12 +109,11 @@ def repeat_doubt(tile: Reading, before: Reading, drift: Drift, rig: Rig) -> str:
 
 def _u_repeated(tile: Reading, drift: Drift, rig: Rig) -> float:
     """Return the relative standard uncertainty of a reading that is repeated by the same lamp."""
-    names = ("u_noise_dn", "u_quantisation_dn", "u_texture_dn", "u_dark_dn", "u_placement_dn")
-    own = [getattr(tile, name) / tile.signal_dn for name in names]
+    own = math.hypot(tile.u_light_dn, tile.u_texture_dn, tile.u_placement_dn) / tile.signal_dn
     lamp = rig.axes.theta_i
     u_deg = 0.0 if isinstance(lamp, HandAxis) else lamp.u_deg  # one set by hand stays
     by_angle = math.radians(u_deg) * math.tan(math.radians(tile.theta_i_deg))
-    return math.hypot(*own, by_angle, drift.u_extrapolated(tile.time_s))
+    return math.hypot(own, by_angle, drift.u_extrapolated(tile.time_s))
 
 
 def _ratio(tile: Reading, other: Reading, drifts: Sequence[Drift]) -> float:

@@ -9,7 +9,7 @@ import hashlib
 import io
 import json
 import zipfile
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +89,13 @@ class Archive:
                 f"{path}: was changed or damaged since it was written. Calibrate again"
             )
         return header, arrays, digest
+
+
+def own_header(calibration: Any) -> dict[str, Any]:
+    """Return all of a calibration, a dataclass, but its arrays and hash."""
+    own = asdict(replace(calibration, arrays={}))
+    del own["arrays"], own["sha256"]
+    return own
 
 
 def without_format(header: dict[str, Any]) -> dict[str, Any]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from instrument.calibration.archive import Archive, bytes_of, without_format
+from instrument.calibration.archive import Archive, bytes_of, own_header, without_format
 from instrument.calibration.camera_calibration import LEVEL_COLUMNS, MAPS, CameraCalibration
 from instrument.calibration.quantity import Quantity
 from instrument.calibration.response_curve import ResponseCurve
@@ -24,7 +24,7 @@ is_camera_file = _ARCHIVE.wrote
 
 def write_camera_file(path: Path, calibration: CameraCalibration) -> CameraCalibration:
     """Write a calibration, whole or not at all, and return it with its hash."""
-    digest = _ARCHIVE.write(path, _own(calibration), _packed(calibration.arrays))
+    digest = _ARCHIVE.write(path, own_header(calibration), _packed(calibration.arrays))
     return replace(calibration, sha256=digest)
 
 
@@ -37,7 +37,7 @@ def read_camera_file(path: Path) -> CameraCalibration:
 
 def header_text(calibration: CameraCalibration) -> str:
     """Return all but the arrays as the text that a run keeps: see `read_camera_header`."""
-    header = {**_ARCHIVE.header(_own(calibration)), "sha256": calibration.sha256}
+    header = {**_ARCHIVE.header(own_header(calibration)), "sha256": calibration.sha256}
     return json.dumps(header, indent=1, ensure_ascii=False) + "\n"
 
 
@@ -52,12 +52,6 @@ def read_camera_header(path: Path) -> CameraCalibration:
     except (ValueError, KeyError, AttributeError, TypeError) as error:
         raise InputError(f"{path}: is no copy of a camera calibration ({error})") from error
     return _calibration(path, header, digest)
-
-
-def _own(calibration: CameraCalibration) -> dict[str, Any]:
-    own = asdict(replace(calibration, arrays={}))
-    del own["arrays"], own["sha256"]
-    return {**own, "notes": list(calibration.notes)}
 
 
 def _packed(arrays: dict[str, FloatArray]) -> dict[str, Any]:

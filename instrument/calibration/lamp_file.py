@@ -6,13 +6,13 @@ for each cell of the picture of the tile (`CELL_COLUMNS`).
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from instrument.calibration.archive import Archive, without_format
+from instrument.calibration.archive import Archive, own_header, without_format
 from instrument.calibration.quantity import Quantity
 from instrument.errors import InputError
 from instrument.geometry import FloatArray
@@ -65,10 +65,9 @@ class LampCalibration:
 
 def write_lamp_file(path: Path, calibration: LampCalibration) -> LampCalibration:
     """Write a calibration, whole or not at all, and return it with its hash."""
-    own = asdict(replace(calibration, arrays={}))
-    del own["arrays"], own["sha256"]
     arrays = dict(sorted(calibration.arrays.items()))
-    return replace(calibration, sha256=_ARCHIVE.write(path, own, arrays))
+    digest = _ARCHIVE.write(path, own_header(calibration), arrays)
+    return replace(calibration, sha256=digest)
 
 
 def read_lamp_file(path: Path) -> LampCalibration:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from acquisition.calibration.checks import SATURATED
+from acquisition.calibration.checks import MOST_SATURATED, SATURATED
 from acquisition.measure.drift import MIN_JUMP
 from analysis.calibration.level_series import LevelSeries
 from instrument.config.camera import CameraConfig
@@ -13,7 +13,6 @@ from instrument.errors import DeviceError, NotDetermined
 from instrument.geometry import BoolArray, FloatArray
 
 _LEAST_LIGHT = 0.05  # of full scale
-_MOST_SATURATED = 0.001  # of the window's pixels: hot ones may be
 _DEAD = 0.1  # of the light before: no lamp that is on loses more between two readings
 _JUMP_U = 6.0  # times the noise of a second difference: none of 180 readings of 1000 calibrations
 _MEDIAN = 1.5  # times a median deviation is a standard deviation; of two frames it is 1.5 too
@@ -43,10 +42,10 @@ def require_unsaturated(frames: list[Frame], patch: BoolArray, camera: CameraCon
     """Raise `NotDetermined` if pixels of the window (rows, columns) are saturated."""
     counts = frames[-1].image[patch]
     share = float(np.mean(counts >= SATURATED * camera.max_dn))
-    if share > _MOST_SATURATED:
+    if share > MOST_SATURATED:
         raise NotDetermined(
             f"lamp: {100 * share:.2g} % of the window's pixels are saturated at "
-            f"{frames[-1].exposure_s:g} s; allowed: {100 * _MOST_SATURATED:g} %. If its light has "
+            f"{frames[-1].exposure_s:g} s; allowed: {100 * MOST_SATURATED:g} %. If its light has "
             "grown since the start, begin a minute later; else take less light, or lower "
             "min_exposure_s if the camera can do less"
         )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.calibration.exposure_search import exposure_reaching, share_of_scale
-from acquisition.calibration.frame_statistics import Level, level_of, stack_of
+from acquisition.calibration.frame_statistics import Level, level_of, series_in_order, stack_of
 from acquisition.calibration.lamp import checks
 from acquisition.calibration.lamp.plan import PICTURE_FRAMES, TARGET, LampPlan
 from acquisition.terminal.console import duration_text
@@ -178,9 +178,4 @@ def series_in_time(levels: list[Level], patch: BoolArray) -> LevelSeries:
 
     patch: (rows, columns), True for the pixels of the window.
     """
-    columns: FloatArray = np.array(levels).T
-    return LevelSeries(
-        exposure_s=columns[0], mean_dn=columns[1], variance_dn2=columns[2],
-        scatter_dn2=columns[3], frames=columns[4], age_s=columns[5],
-        pixels=int(np.count_nonzero(patch)),
-    )  # fmt: skip
+    return series_in_order(levels, int(np.count_nonzero(patch)))

@@ -13,7 +13,8 @@ from acquisition.interlocks.lamp_checks import UNPROVEN
 from acquisition.interlocks.reference_level import angle_doubt, level_doubt, repeat_doubt
 from acquisition.measure.drift import Drift
 from acquisition.measure.placement import Placement
-from acquisition.results.reduction import reduce
+from acquisition.plan.plan import make_plan
+from acquisition.results.reduction import Reduced, reduce
 from instrument.config.load import Loaded
 from instrument.config.protocol import References
 from instrument.config.rig import Rig, SimulatedTile
@@ -126,15 +127,20 @@ def test_a_tile_follows_its_table_where_it_has_one(tmp_path: Path) -> None:
     assert not angle_doubt(*white, drifts, rig)
 
 
+def _undisturbed(loaded: Loaded, folder: Path) -> Reduced:
+    """Values of a scan without a fault."""
+    with Record.create(folder, {}) as record:
+        scan(loaded, record)
+        return reduce(record.readings(), loaded.protocol, ())
+
+
 @pytest.mark.parametrize("wrong_deg", [30.0, 60.0])
 def test_a_lamp_set_by_hand_at_a_wrong_angle_stops_the_scan_and_all_of_it_is_measured_again(
     wrong_deg: float, record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One of two settings is wrong, the tile at the second is read after its points."""
     loaded = small_scan("paper_1995")
-    with Record.create(tmp_path / "good", {}) as other:
-        scan(loaded, other)
-        good = reduce(other.readings(), loaded.protocol, ())
+    good = _undisturbed(loaded, tmp_path / "good")
     off, real = {wrong_deg: 5.0 if wrong_deg > 45 else 16.0}, Scene.set_axis
 
     def set_axis(scene: Scene, axis: str, angle_deg: float) -> None:
@@ -206,9 +212,7 @@ def test_a_sound_scan_has_the_same_values_with_the_tile_at_the_end(
     rig_name: str, record: Record, tmp_path: Path
 ) -> None:
     scan(_read_again(rig_name), record)
-    with Record.create(tmp_path / "once", {}) as other:
-        scan(small_scan(rig_name), other)
-        once = reduce(other.readings(), small_scan(rig_name).protocol, ())
+    once = _undisturbed(small_scan(rig_name), tmp_path / "once")
     found = reduce(record.readings(), _read_again(rig_name).protocol, record.checks())
     assert not any(found.flags)
     assert found.brdf == pytest.approx(once.brdf, rel=0.01)
@@ -221,10 +225,8 @@ def test_a_lamp_that_changes_after_the_tile_is_told_by_the_tile_at_the_end(
 ) -> None:
     """The drift checks all come after the change: they agree with one another."""
     loaded = _read_again(rig_name)
-    with Record.create(tmp_path / "good", {}) as other:
-        scan(loaded, other)
-        good = reduce(other.readings(), loaded.protocol, ())
-        first = next(r.step for r in other.readings() if r.kind == "drift")
+    good = _undisturbed(loaded, tmp_path / "good")
+    first = next(step.index for step in make_plan(loaded).steps if step.kind == "drift")
     fault = LampFault(at_step={first: level}).install(monkeypatch)
     with pytest.raises(Interlock, match=r"white tile: white tile at|light: white tile at"):
         scan(loaded, record)
