@@ -26,7 +26,7 @@ def struck(
         start_new_session=True,
     ) as process:  # fmt: skip
         end_s = time.monotonic() + DEADLINE_S
-        while process.poll() is None and not _is_due(process.pid, cpu_s):
+        while process.poll() is None and not _is_due(process.pid, number, cpu_s):
             assert time.monotonic() < end_s, "the command does not come so far"
             time.sleep(0.001)
         process.send_signal(number)
@@ -34,12 +34,16 @@ def struck(
     return subprocess.CompletedProcess(arguments, process.returncode, out, err)
 
 
-def _is_due(pid: int, cpu_s: float) -> bool:
-    """Return True once SIGTERM is caught and the main thread has computed long enough."""
+def _is_due(pid: int, number: signal.Signals, cpu_s: float) -> bool:
+    """Return True once the signal is caught and the main thread has computed long enough.
+
+    SIGTERM too: Python itself catches SIGINT, before the command does.
+    """
     folder = Path(f"/proc/{pid}")
     try:
         status, schedule = (folder / "status").read_text(), (folder / "schedstat").read_text()
     except OSError:
         return False
     caught = int(status.partition("SigCgt:")[2].split()[0], 16)
-    return bool(caught >> (signal.SIGTERM - 1) & 1) and int(schedule.split()[0]) >= cpu_s * 1e9
+    handled = all(caught >> (n - 1) & 1 for n in (signal.SIGTERM, number))
+    return handled and int(schedule.split()[0]) >= cpu_s * 1e9
