@@ -22,8 +22,16 @@ def _blocks(language: str, text: str = README) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
 
 
+def _configs(folder: Path) -> None:
+    """Copy the rigs and protocols, with every third view angle: a whole scan proves no more."""
+    shutil.copytree(CONFIGS, folder / "configs")
+    for path in (folder / "configs" / "protocols").glob("*.yaml"):
+        text = path.read_text()
+        path.write_text(re.sub(r"num: (\d+)", lambda n: f"num: {(int(n[1]) - 1) // 3 + 1}", text))
+
+
 def test_the_commands_succeed_in_the_order_given(tmp_path: Path) -> None:
-    shutil.copytree(CONFIGS, tmp_path / "configs")
+    _configs(tmp_path)
     blocks = [*_blocks("sh"), *_blocks("sh", RIGS)]
     commands = [line for block in blocks for line in block.splitlines()]
     gonio = [line.split()[1:] for line in commands if line.startswith("gonio ")]
@@ -51,7 +59,7 @@ def test_the_protocol_is_valid(tmp_path: Path) -> None:
 
 
 def test_the_python_examples_run_in_the_order_given(tmp_path: Path) -> None:
-    shutil.copytree(CONFIGS, tmp_path / "configs")
+    _configs(tmp_path)
     blocks = _blocks("python")
     assert blocks
     for block in blocks:

@@ -20,6 +20,7 @@ from acquisition.results.reduction import Reduced, reduce
 from acquisition.results.summary import notes
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded, load_protocol
+from instrument.config.protocol import angles_deg
 from instrument.record.record import Record
 from tests.support.paths import CONFIGS
 from tests.support.scans import changed, shrunk
@@ -35,10 +36,17 @@ PUBLISHED = {
 }
 
 
-def load(name: str, rig: str = "bench_12bit") -> Loaded:
-    """A sample on a rig whose camera has a ninth of its pixels: they cost most of the time."""
+def load(name: str, rig: str = "bench_12bit", whole: bool = False) -> Loaded:
+    """A sample on a rig whose camera has a ninth of its pixels; not `whole`: every second view."""
     rig_path = CONFIGS / "rigs" / f"{rig}.yaml"
-    return shrunk(load_protocol(CONFIGS / "protocols" / f"{name}.yaml", rig_path), 3)
+    loaded = shrunk(load_protocol(CONFIGS / "protocols" / f"{name}.yaml", rig_path), 3)
+    if whole:
+        return loaded
+    sweeps = [
+        {**sweep, "theta_r_deg": angles_deg(sweep["theta_r_deg"])[::2].tolist()}
+        for sweep in loaded.protocol.sweeps
+    ]
+    return changed(loaded, sweeps=sweeps)
 
 
 def measured(loaded: Loaded, folder: Path) -> tuple[Reduced, Fitted, tuple[str, ...]]:
@@ -66,9 +74,13 @@ def assert_as_published(name: str, fitted: Fitted) -> None:
     assert chosen.values.get("ks", 0.0) == pytest.approx(ks, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_the_simulated_rig_recovers_the_published_parameters(name: str, tmp_path: Path) -> None:
-    loaded = load(name)
+def test_the_simulated_rig_recovers_the_published_parameters(
+    name: str, slow: bool, tmp_path: Path
+) -> None:
+    """Each with its whole protocol; without --slow with every second view angle."""
+    loaded = load(name, whole=slow)
     _, fitted, _ = measured(loaded, tmp_path / "run")
     assert_as_published(name, fitted)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from instrument.record.record import FILE_NAME
 from instrument.record.schema import SCHEMA_VERSION
-from tests.support.command import gonio
+from tests.support.command import gonio_here as gonio
 from tests.support.paths import CONFIGS
 from tests.support.storage.older_records import as_version, seal_again
 

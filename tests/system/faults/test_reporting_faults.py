@@ -15,7 +15,7 @@ from instrument.config.load import Loaded
 from instrument.errors import StorageError
 from instrument.record.record import Record
 from sim.faults.faults import VARIABLE
-from tests.support.command import gonio
+from tests.support.command import gonio_here as gonio
 from tests.support.scans import small_scan
 
 RESULTS = ("measurements.csv", "fit.json", "report.html")

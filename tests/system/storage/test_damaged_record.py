@@ -13,7 +13,7 @@ import pytest
 
 from instrument.errors import InputError
 from instrument.record.record import FILE_NAME, Record
-from tests.support.command import gonio
+from tests.support.command import gonio_here as gonio
 from tests.support.storage.bit_flips import flips
 from tests.support.strangers.run_folders import run_few_points
 

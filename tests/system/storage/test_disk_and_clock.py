@@ -26,7 +26,7 @@ from instrument.errors import StorageError
 from instrument.record import write_lock
 from instrument.record.reading import Reading
 from instrument.record.record import FILE_NAME, Record
-from tests.support.command import gonio
+from tests.support.command import gonio_here as gonio
 from tests.support.paths import CONFIGS, ROOT
 from tests.support.scans import small_scan, undated
 from tests.support.storage.holder import Holder, held

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from instrument.record.record import Record
-from tests.support.command import gonio
+from tests.support.command import gonio_here as gonio
 from tests.support.storage.older_records import as_version
 from tests.support.strangers.run_folders import Sent, run_few_points
 

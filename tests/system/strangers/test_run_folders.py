@@ -11,7 +11,7 @@ from acquisition.commands.scan import report_run, resume_run
 from acquisition.results.sources import Wanted, read_source
 from instrument.errors import GonioError, InputError, NotDetermined
 from instrument.record.record import FILE_NAME
-from tests.support.command import gonio
+from tests.support.command import gonio_here as gonio
 from tests.support.strangers.run_folders import REFUSED, SCRIPT, Sent, copy_of, run_few_points
 
 
