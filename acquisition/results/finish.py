@@ -12,7 +12,7 @@ from acquisition.results.fitting import fit_run
 from acquisition.results.measurements_csv import measurements_csv
 from acquisition.results.reduction import reduced_run
 from acquisition.results.report_inputs import report_data
-from acquisition.results.summary import budget, headline, notes, parameters_of, scan_state
+from acquisition.results.summary import headline, notes, parameters_of, scan_state
 from analysis.report.data import Parameter
 from analysis.report.page import write_report
 from instrument.config.load import Loaded
@@ -45,7 +45,7 @@ def finish(record: Record, loaded: Loaded) -> Outcome:
     if not reduced.points:
         raise NoMeasurement(f"no geometry has been measured yet: {scan_state(record)}")
     fitted = fit_run(reduced, loaded)
-    u_brdf = fitted.u_brdf(reduced)
+    u_brdf, parts = fitted.u_brdf(reduced), fitted.parts(reduced)
     outcome = Outcome(
         scan_state(record),
         headline(fitted),
@@ -55,7 +55,7 @@ def finish(record: Record, loaded: Loaded) -> Outcome:
         record.folder / "report.html",
     )
     with _recovery_named(record.folder):
-        table = measurements_csv(reduced, u_brdf, loaded)
+        table = measurements_csv(reduced, u_brdf, parts, loaded)
         write_whole(record.folder / "measurements.csv", table)
         write_whole(record.folder / "fit.json", json.dumps(outcome.fit, indent=2, allow_nan=False))
     content = report_data(
@@ -64,7 +64,7 @@ def finish(record: Record, loaded: Loaded) -> Outcome:
         record,
         loaded,
         u_brdf=u_brdf,
-        budget=budget(reduced, u_brdf),
+        parts=parts,
         headline=outcome.headline,
         notes=outcome.notes,
     )

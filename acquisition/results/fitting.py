@@ -12,6 +12,7 @@ from acquisition.results.reduction import Reduced, require_usable, root_sum_squa
 from analysis.choice.choice import Choice, choose
 from analysis.choice.fit_json import no_fit_json, to_json
 from analysis.data.acceptance import Acceptance
+from analysis.data.covariance import ANGLES, contributions
 from analysis.data.measurements import Measurements
 from analysis.fit.fit import FitResult, stated_u
 from instrument.config.load import Loaded
@@ -45,6 +46,21 @@ class Fitted:
         if self.choice is not None:
             return to_json(self.choice)
         return no_fit_json(self.failure or NotDetermined(self.reason))
+
+    def parts(self, reduced: Reduced) -> dict[str, FloatArray]:
+        """Standard uncertainties of the BRDF by name, (N,) and relative.
+
+        For fitted points with the part that needs a model: how angles change the value. For the
+        others that is not known, NaN for the angles' setting.
+        """
+        parts, m = reduced.parts, self.measurements
+        if self.chosen is None or m is None or not reduced.has_brdf:
+            return parts
+        parts[ANGLES] = np.full(len(reduced.points), np.nan)
+        for name, u in contributions(m, self.chosen.brdf).items():
+            parts[name] = parts[name].copy()
+            parts[name][self.used] = u / np.abs(m.brdf)
+        return parts
 
     def u_brdf(self, reduced: Reduced) -> FloatArray:
         """Standard uncertainty of every BRDF, (N,) in 1/sr.

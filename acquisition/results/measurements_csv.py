@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from itertools import repeat
 
@@ -27,8 +27,10 @@ COLUMNS = (
 NO_BRDF = "no brdf"
 
 
-def measurements_csv(reduced: Reduced, u_brdf: FloatArray, loaded: Loaded) -> str:
-    """Return the text of the table; u_brdf (N,) in 1/sr.
+def measurements_csv(
+    reduced: Reduced, u_brdf: FloatArray, parts: Mapping[str, FloatArray], loaded: Loaded
+) -> str:
+    """Return the text of the table; u_brdf (N,) in 1/sr, its parts by name (N,) and relative.
 
     After COLUMNS, which are documented, comes one column for each component of the uncertainty,
     then what a fit needs, then the protocol's metadata as far as given. A value that is not known
@@ -36,9 +38,9 @@ def measurements_csv(reduced: Reduced, u_brdf: FloatArray, loaded: Loaded) -> st
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    parts = ((f"u_{n.replace(' ', '_')}_relative", _cells(u)) for n, u in reduced.parts.items())
+    components = ((f"u_{n.replace(' ', '_')}_relative", _cells(u)) for n, u in parts.items())
     metadata = ((name, repeat(fact)) for name, fact in loaded.protocol.metadata.given().items())
-    further = dict((*parts, *_columns_for_fits(reduced, loaded), *metadata))
+    further = dict((*components, *_columns_for_fits(reduced, loaded), *metadata))
     writer.writerow([*COLUMNS, *further])
     values = (reduced.radiance, reduced.u_radiance, reduced.brdf, u_brdf)
     cells = [_cells(value) for value in values]

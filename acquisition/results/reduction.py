@@ -20,6 +20,8 @@ from acquisition.interlocks.no_light import NO_SIGNAL, unlit_steps
 from acquisition.measure.drift import Drift, rate
 from acquisition.measure.placement import tilt_deg
 from acquisition.measure.white_tile import Standard, standard
+from acquisition.results.effects.effect import Readings
+from acquisition.results.effects.rig_effects import has_effects, rig_effects, tiles_of
 from analysis.data.measurements import SharedError
 from analysis.fit.certificate import CERTIFICATE
 from instrument.config.load import Loaded
@@ -117,12 +119,43 @@ def reduced_run(record: Record, loaded: Loaded) -> Reduced:
     readings = record.readings()
     doubted = doubted_steps(readings, record.events())
     reduced = reduce(readings, loaded.protocol, record.checks(), doubted)
+    if has_effects(loaded.rig.uncertainty):
+        reduced = with_rig_effects(reduced, readings, loaded)
     measured = loaded.rig.camera.measured
     if measured is None:
         return reduced
     # The response is wrong alike at equal counts only, and what is common is part of the scale.
     u = np.full(len(reduced.points), measured.u_light_relative)
     return replace(reduced, components={**reduced.components, LINEARITY: u})
+
+
+def with_rig_effects(reduced: Reduced, readings: Sequence[Reading], loaded: Loaded) -> Reduced:
+    """Return the run with the effects that its rig file states: corrected, and their u added."""
+    theta_i = np.radians([p.theta_i_deg for p in reduced.points])
+    found = rig_effects(
+        Readings(
+            points=reduced.points,
+            tiles=tiles_of(reduced.points, readings),
+            value=reduced.brdf if reduced.has_brdf else reduced.radiance / np.cos(theta_i),
+            absolute=reduced.has_brdf,
+            rig=loaded.rig,
+            protocol=loaded.protocol,
+        )
+    )
+    components = {**reduced.components, **found.components}
+    if reduced.has_brdf:  # the radiance itself stays as measured
+        return replace(
+            reduced,
+            brdf=reduced.brdf * found.factor,
+            components=components,
+            shared_by_tile=(*reduced.shared_by_tile, *found.shared),
+        )
+    return replace(
+        reduced,
+        radiance=reduced.radiance * found.factor,
+        components=components,
+        shared=(*reduced.shared, *found.shared),
+    )
 
 
 def require_usable(reduced: Reduced) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from acquisition.results.fitting import Fitted
 from acquisition.results.reduction import Reduced
-from acquisition.results.summary import Budget, parameters_of
+from acquisition.results.summary import budget, parameters_of, sources_of
 from acquisition.results.versions import LIBRARIES, versions_of
 from analysis.fit.fit import FitResult
 from analysis.report.data import Candidate, Curve, ReportData
@@ -27,11 +29,11 @@ def report_data(
     loaded: Loaded,
     *,
     u_brdf: FloatArray,
-    budget: Budget,
+    parts: Mapping[str, FloatArray],
     headline: str,
     notes: tuple[str, ...],
 ) -> ReportData:
-    """Return the content of the report; u_brdf (N,) in 1/sr."""
+    """Return the content of the report; u_brdf (N,) in 1/sr, its parts (N,) and relative."""
     protocol, points = loaded.protocol, reduced.points
     size, patch = protocol.sample, protocol.window
     return ReportData(
@@ -52,7 +54,8 @@ def report_data(
         flags=reduced.flags,
         fitted=fitted.used if fitted.choice else np.zeros(len(points), dtype=bool),
         candidates=candidates(fitted),
-        budget=budget,
+        budget=budget(parts),
+        sources=sources_of(parts),
         previews=tuple(record.previews()),
         rig=(*_rig_rows(loaded.rig), *_tile_rows(protocol.references.white_tile)),
         devices=tuple(record.devices().items()),

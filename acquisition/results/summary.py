@@ -2,13 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from acquisition.results.damage import damage_text
+from acquisition.results.effects.lens import STRAY, VIGNETTING, WALLS
+from acquisition.results.effects.polarisation import CAMERA, LAMP
+from acquisition.results.effects.rig_effects import stated_sizes
+from acquisition.results.effects.sensor import DARK_DRIFT, FLAT, NONLINEAR
+from acquisition.results.effects.surface import (
+    TILE_AGED,
+    TILE_TILT,
+    TILE_TILT_ACROSS,
+    TILT,
+    TILT_ACROSS,
+    ZEROS,
+)
 from acquisition.results.fitting import Fitted, u_without
-from acquisition.results.reduction import DARK, NOISE, ROUNDING, Reduced, standard_of
+from acquisition.results.reduction import (
+    DARK,
+    LINEARITY,
+    NOISE,
+    PLACEMENT,
+    ROUNDING,
+    TEXTURE,
+    TILE,
+    TILE_PLACEMENT,
+    TILE_READING,
+    Reduced,
+    standard_of,
+)
 from analysis.choice.notes import NoteCode
+from analysis.data.covariance import ANGLES
 from analysis.fit.fit import FitResult
+from analysis.fit.shared_values import shared_values
 from analysis.report.data import Parameter
 from analysis.report.style import format_value
 from instrument.config.load import Loaded
@@ -20,10 +48,24 @@ Budget = tuple[tuple[str, float, float], ...]
 
 FEW_BITS = 8  # of a camera whose rounding deserves a note
 NOTABLE_PULL = 2.0  # in u
+_TOLD_SHARE = 0.7  # of the stated u of an effect, below which the data tell its size
 VERDICTS = {
     "adequate": "the simplest model that explains the data within their uncertainty",
     "none adequate": "the best of the models, but none explains the data within their uncertainty",
     "not identifiable": "agrees with the data, but they do not determine all of its parameters",
+}
+# Kinds of components, as a chart shows them.
+_SOURCES = {
+    **dict.fromkeys((NOISE, ROUNDING), "noise"),
+    **dict.fromkeys((DARK, DARK_DRIFT), "dark"),
+    **dict.fromkeys((LINEARITY, NONLINEAR), "linearity"),
+    **dict.fromkeys((FLAT, VIGNETTING), "flat field"),
+    **dict.fromkeys((STRAY, WALLS), "stray light"),
+    **dict.fromkeys((LAMP, CAMERA), "polarisation"),
+    **dict.fromkeys((TILE, TILE_READING, TILE_PLACEMENT, TILE_AGED), "white tile"),
+    **dict.fromkeys((TILE_TILT, TILE_TILT_ACROSS), "white tile"),
+    **dict.fromkeys((TILT, TILT_ACROSS, PLACEMENT, TEXTURE), "place and tilt of the sample"),
+    **dict.fromkeys((ANGLES, *ZEROS.values()), "angles"),
 }
 _PAPER_RATIO = "ks/albedo"
 _UNITS = {"degrees": "°", "1": ""}
@@ -80,24 +122,28 @@ def paper_ratio_note(chosen: FitResult) -> str:
     return f"{text}rho times {quarter} = ks/albedo/4, where rho is the albedo"
 
 
-def budget(reduced: Reduced, u_brdf: FloatArray) -> Budget:
+def budget(parts: Mapping[str, FloatArray]) -> Budget:
     """Return rows of (component, median relative u in %, share of the variance in %).
 
-    The largest share comes first. u_brdf (N,) in 1/sr.
+    The largest share comes first. `parts`: relative u by component, (N,).
     """
-    parts = {name: u**2 for name, u in reduced.parts.items()}
-    known = np.isfinite(reduced.brdf)
-    if known.any():
-        total = (u_brdf / reduced.brdf) ** 2
-        # The fit's total contains the angles, and the other parts as they are here.
-        parts["angle setting"] = np.maximum(total - np.sum(list(parts.values()), axis=0), 0.0)
-        parts = {name: part[known] for name, part in parts.items()}
-    whole = sum(float(np.mean(p)) for p in parts.values())
+    variances = {name: u[np.isfinite(u)] ** 2 for name, u in parts.items()}
+    variances = {name: v for name, v in variances.items() if v.size}
+    whole = sum(float(np.mean(v)) for v in variances.values())
     rows = [
-        (name, 100 * float(np.median(np.sqrt(p))), 100 * float(np.mean(p)) / whole)
-        for name, p in parts.items()
+        (name, 100 * float(np.median(np.sqrt(v))), 100 * float(np.mean(v)) / whole)
+        for name, v in variances.items()
     ]
     return tuple(sorted(rows, key=lambda row: -row[2]))
+
+
+def sources_of(parts: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Combine the components of one kind: relative u (N,) by source, for a chart."""
+    found: dict[str, FloatArray] = {}
+    for name, u in parts.items():
+        source = _SOURCES.get(name, name)
+        found[source] = np.hypot(found.get(source, 0.0), np.nan_to_num(u))
+    return found
 
 
 def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> tuple[str, ...]:
@@ -116,6 +162,7 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         _flag_note(reduced),
         _drift_note(reduced),
         _pull_note(fitted),
+        _effects_note(fitted, loaded),
         _bits_note(reduced, fitted, loaded),
         _exposure_note(reduced, record),
         _tile_note(reduced, loaded),
@@ -236,6 +283,21 @@ def _pull_note(fitted: Fitted) -> str:
     pulls = fitted.chosen.pulls if fitted.chosen is not None else {}
     large = [f"{name}, {pull:+.1f} u" for name, pull in pulls.items() if abs(pull) > NOTABLE_PULL]
     return f"large shared errors in the fit: {'; '.join(large)}" if large else ""
+
+
+def _effects_note(fitted: Fitted, loaded: Loaded) -> str:
+    """Sizes of the rig file's effects that the data tell more closely, as the chosen model fits."""
+    choice, chosen = fitted.choice, fitted.chosen
+    if choice is None or chosen is None or chosen.model not in choice.agreeing:
+        return ""
+    stated = stated_sizes(loaded.rig.uncertainty)
+    texts = []
+    for found in shared_values(chosen):
+        if found.name in stated and found.u < _TOLD_SHARE:
+            size, u, unit = stated[found.name]
+            value = format_value(size + found.value * u, found.u * u, unit)
+            texts.append(f"{found.name} {value} (stated: {size:.2g} ± {u:.2g} {unit})")
+    return f"the data suggest, if {chosen.model} holds: {'; '.join(texts)}" if texts else ""
 
 
 def _bits_note(reduced: Reduced, fitted: Fitted, loaded: Loaded) -> str:

@@ -10,6 +10,7 @@ from analysis.choice.choice import Choice
 from analysis.choice.symmetry_test import Symmetry
 from analysis.fit.fit import FitResult
 from analysis.fit.scale_ratios import Ratio
+from analysis.fit.shared_values import SharedValue, shared_values
 from instrument.errors import NoMeasurement, NotDetermined
 
 
@@ -23,6 +24,12 @@ def to_json(choice: Choice) -> dict[str, Any]:
         "reason": choice.reason,
         "notes": [note.json for note in choice.notes],
         "symmetry": None if choice.symmetry is None else _symmetry(choice.symmetry),
+        "shared_errors": [
+            _shared(e)
+            for c in choice.candidates
+            if c.model == choice.chosen
+            for e in shared_values(c)
+        ],
         "candidates": [_candidate(c, choice.agreeing) for c in choice.candidates],
     }
 
@@ -46,6 +53,11 @@ def _candidate(result: FitResult, agreeing: Container[str]) -> dict[str, Any]:
         "message": result.message,
         "ratios": {name: _ratio(ratio) for name, ratio in result.ratios.items()},
     }
+
+
+def _shared(error: SharedValue) -> dict[str, Any]:
+    """Most likely value of a shared error, in units of its stated u."""
+    return {"name": error.name, "value_in_u": _number(error.value), "u_in_u": _number(error.u)}
 
 
 def _symmetry(tested: Symmetry) -> dict[str, Any]:

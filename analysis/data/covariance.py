@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     Columns = FloatArray | csr_array
 
-LAMP_LEVEL = "lamp level"
+LAMP_LEVEL, ANGLES = "lamp level", "angle setting"
 
 _MAX_DENSE = 100_000  # entries of a dense array; larger ones are mostly zeros, so sparse
 # A model may be steeper than the data between neighbours by this factor: at the flank of a lobe of
@@ -158,23 +158,7 @@ def full_covariance(measurements: Measurements, brdf: Brdf) -> Covariance:
     m = measurements
     if m.u_random is None:
         raise ValueError("u_random is not stated; allowed: a u_random in 1/sr for every point")
-    f = brdf(m.geometry)
-    unlimited, limit = np.full(m.size, np.inf), _view_limit(m)
-    angles: tuple[tuple[str, dict[str, float], FloatArray, IntArray | FloatArray], ...] = (
-        ("theta_r", {"theta_r": m.u_theta_r_deg}, limit, m.theta_r_deg),
-        ("theta_i, lamp setting", {"theta_i": m.u_theta_i_deg}, unlimited, m.lamp_setting),
-        ("dphi, lamp setting", {"dphi": m.u_dphi_deg}, unlimited, m.lamp_setting),
-    )
-    groups = [
-        (name, np.clip(angle_sensitivity(m, brdf, **u), -most, most), group)
-        for name, u, most, group in angles
-    ]
-    for error in m.shared:
-        turned = angle_sensitivity(m, brdf, theta_i=error.theta_i_deg, theta_r=error.theta_r_deg)
-        groups.append((error.name, f * error.u_relative + turned, error.group))
-    if m.free_levels:
-        groups.append((LAMP_LEVEL, _U_UNKNOWN_LEVEL * f, m.lamp_setting))
-    second_order = [np.clip(_second_order_u(m, brdf, **u), -most, most) for _, u, most, _ in angles]
+    groups, second_order = _shifts(m, brdf)
     variance = np.square(m.u_random) + np.sum(np.square(second_order), axis=0)
     rows: list[IntArray] = []
     columns: list[IntArray] = []
@@ -190,6 +174,48 @@ def full_covariance(measurements: Measurements, brdf: Brdf) -> Covariance:
     places = np.concatenate(rows), np.concatenate(columns)
     common = _matrix(np.concatenate(shifts), places, (m.size, len(names)))
     return Covariance(variance, common, tuple(_numbered(names)))
+
+
+def contributions(measurements: Measurements, brdf: Brdf) -> dict[str, FloatArray]:
+    """Standard uncertainty (N,) in 1/sr of each point by each shared error, and by the angles.
+
+    As in `full_covariance`; errors of one name are combined, as are those of all angles, which are
+    under `ANGLES`.
+    """
+    groups, second_order = _shifts(measurements, brdf)
+    found: dict[str, FloatArray] = {ANGLES: np.sqrt(np.sum(np.square(second_order), axis=0))}
+    for number, (name, shift, _) in enumerate(groups):
+        key = ANGLES if number < len(second_order) else name
+        found[key] = np.hypot(found.get(key, 0.0), shift)
+    return found
+
+
+def _shifts(
+    m: Measurements, brdf: Brdf
+) -> tuple[list[tuple[str, FloatArray, IntArray | FloatArray]], list[FloatArray]]:
+    """Name, shift (N,) in 1/sr by one u, and group (N,) of each error; those of angles come first.
+
+    Then the second-order contributions of the angles, (N,) in 1/sr each.
+    """
+    f = brdf(m.geometry)
+    unlimited, limit = np.full(m.size, np.inf), _view_limit(m)
+    angles: tuple[tuple[str, dict[str, float], FloatArray, IntArray | FloatArray], ...] = (
+        ("theta_r", {"theta_r": m.u_theta_r_deg}, limit, m.theta_r_deg),
+        ("theta_i, lamp setting", {"theta_i": m.u_theta_i_deg}, unlimited, m.lamp_setting),
+        ("dphi, lamp setting", {"dphi": m.u_dphi_deg}, unlimited, m.lamp_setting),
+    )
+    groups = [
+        (name, np.clip(angle_sensitivity(m, brdf, **u), -most, most), group)
+        for name, u, most, group in angles
+    ]
+    for error in m.shared:
+        theta_i, theta_r, dphi = error.angles_deg
+        turned = angle_sensitivity(m, brdf, theta_i=theta_i, theta_r=theta_r, dphi=dphi)
+        groups.append((error.name, f * error.u_relative + turned, error.group))
+    if m.free_levels:
+        groups.append((LAMP_LEVEL, _U_UNKNOWN_LEVEL * f, m.lamp_setting))
+    second_order = [np.clip(_second_order_u(m, brdf, **u), -most, most) for _, u, most, _ in angles]
+    return groups, second_order
 
 
 def _matrix(

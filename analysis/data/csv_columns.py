@@ -11,7 +11,8 @@ be left out: a run's measurements.csv has them all, a table of any origin may ha
     u_independent_relative      relative u of the row that no other row shares (in place of u_brdf)
     u_shared_NAME_relative      relative change of the row by one u of an error that rows share
     group_NAME                  rows with the same number share that error; absent: all rows do
-    theta_i_by_NAME_deg, theta_r_by_NAME_deg       change of the angles by one u of that error
+    theta_i_by_NAME_deg, theta_r_by_NAME_deg, dphi_by_NAME_deg
+                                change of the angles by one u of that error
     u_theta_i_deg, u_theta_r_deg, u_dphi_deg       standard uncertainty of each angle's setting
     beam_length_mm, lamp_distance_mm               from the sample to the lens, and to the lamp
     source_solid_angle_sr, receiver_solid_angle_sr of lamp and lens, seen from the sample
@@ -60,7 +61,7 @@ ACCEPTANCE = (
 )
 _OPTIONAL = (RADIANCE, LAMP_SETTING, U_INDEPENDENT, *U_ANGLES, *ACCEPTANCE)
 _READ = {FLAGS, *(column.name for column in (*COLUMNS, *_OPTIONAL))}
-_SHARED = re.compile(r"u_shared_(.+)_relative|group_(.+)|theta_[ir]_by_(.+)_deg")
+_SHARED = re.compile(r"u_shared_(.+)_relative|group_(.+)|(?:theta_[ir]|dphi)_by_(.+)_deg")
 
 
 def is_read(name: str) -> bool:
@@ -89,13 +90,13 @@ def group(stem: str) -> Column:
     return Column(f"group_{stem}", "", "a whole number", -1e15, 1e15, whole=True)
 
 
-def angles_by(stem: str) -> tuple[Column, Column]:
-    """Columns of the change of theta_i and of theta_r by one u of an error."""
-    theta_i, theta_r = (
+def angles_by(stem: str) -> tuple[Column, Column, Column]:
+    """Columns of the change of theta_i, theta_r and dphi by one u of an error."""
+    theta_i, theta_r, dphi = (
         Column(f"{angle}_by_{stem}_deg", "deg", "-90 to 90 deg", -90.0, 90.0)
-        for angle in ("theta_i", "theta_r")
+        for angle in ("theta_i", "theta_r", "dphi")
     )
-    return theta_i, theta_r
+    return theta_i, theta_r, dphi
 
 
 def stems(errors: Iterable[str]) -> Iterator[str]:

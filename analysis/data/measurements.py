@@ -24,8 +24,9 @@ class SharedError:
 
     u_relative: (N,), signed change of each point by one standard deviation of the error, relative
     to its value; 0 for points that do not have it.
-    theta_i_deg, theta_r_deg: (N,) or 0, signed change of the true angles by one standard deviation
-    of the error. What it does to the value depends on the reflectance and is not in `u_relative`.
+    theta_i_deg, theta_r_deg, dphi_deg: (N,) or 0, signed change of the true angles by one standard
+    deviation of the error. What it does to the value depends on the reflectance and is not in
+    `u_relative`.
     """
 
     name: str
@@ -33,6 +34,7 @@ class SharedError:
     group: IntArray
     theta_i_deg: FloatArray | float = 0.0
     theta_r_deg: FloatArray | float = 0.0
+    dphi_deg: FloatArray | float = 0.0
 
     def subset(self, points: BoolArray) -> SharedError:
         """The same error for the points marked True in `points` (N,)."""
@@ -40,9 +42,9 @@ class SharedError:
         return SharedError(self.name, self.u_relative[points], self.group[points], *angles)
 
     @property
-    def angles_deg(self) -> tuple[FloatArray | float, FloatArray | float]:
-        """Change of theta_i and of theta_r by one standard deviation, (N,) or 0, in degrees."""
-        return self.theta_i_deg, self.theta_r_deg
+    def angles_deg(self) -> tuple[FloatArray | float, FloatArray | float, FloatArray | float]:
+        """Change of theta_i, theta_r, dphi by one standard deviation, (N,) or 0, in degrees."""
+        return self.theta_i_deg, self.theta_r_deg, self.dphi_deg
 
     @classmethod
     def common_to_all(cls, name: str, u_relative: float, size: int) -> SharedError:

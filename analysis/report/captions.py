@@ -144,3 +144,11 @@ def _marker_caption(data: ReportData) -> str:
     if left_out.any() and data.fitted.any():
         caption += " Open markers: points not in the fit."
     return caption.strip()
+
+
+def budget_caption(sweeps: Sweeps) -> str:
+    """Key to the chart of the uncertainty budget."""
+    return (
+        f"The top is the standard uncertainty of a point at that {sweeps[0].axis.name}; each band "
+        "is as high as its share of the variance. Sources of one kind are combined."
+    )

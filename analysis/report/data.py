@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -70,6 +70,7 @@ class ReportData:
     verdict: the headline, then further sentences. verdict_kind: `adequate`, `none adequate`, `not
         identifiable`, or empty where nothing was fitted; sets the colour of the box.
     budget: rows of (component, median relative u in %, share of the variance in %).
+    sources: relative standard uncertainties (N,) by source, those of one kind combined.
     """
 
     title: str
@@ -89,6 +90,7 @@ class ReportData:
     fitted: BoolArray
     candidates: tuple[Candidate, ...] = ()
     budget: tuple[tuple[str, float, float], ...] = ()
+    sources: Mapping[str, FloatArray] = field(default_factory=dict)
     previews: tuple[Preview, ...] = ()
     rig: Rows = ()
     devices: Rows = ()

@@ -12,7 +12,10 @@ import struct
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+
 from analysis.report import captions, charts
+from analysis.report.budget_chart import budget_chart, stacks
 from analysis.report.data import Candidate, Parameter, ReportData, Rows
 from analysis.report.polar import polar_chart
 from analysis.report.style import CSS, escaped, format_value, html_page, short_number
@@ -48,7 +51,7 @@ def report_html(data: ReportData) -> str:
         _charts(data, sweeps),
         _candidates(data),
         _flagged(data),
-        _budget(data),
+        _budget(data, sweeps),
         _pictures(data.previews),
         _facts(data),
     ]
@@ -217,16 +220,21 @@ def _flagged(data: ReportData) -> str:
     )
 
 
-def _budget(data: ReportData) -> str:
+def _budget(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
     if not data.budget:
         return ""
     rows = (
         _row((escaped(name), f"#{_percent(u)}", f"#{_number(share, '.0f')} %", _bar(share)))
         for name, u, share in data.budget
     )
+    drawn = ""
+    if any(np.any(stacks(data, sweep)) for sweep in sweeps):
+        label, caption = "uncertainty by source", captions.budget_caption(sweeps)
+        drawn = _figure([budget_chart(data, sweeps)], label, caption)
     return (
         '<h2 id="budget">Uncertainty budget</h2>\n'
         '<p class="soft">Standard uncertainty (k = 1) of a point, relative to its value.</p>\n'
+        + drawn
         + _table(("Source", "#Relative u, median", "#Share of variance", ""), rows)
     )
 

@@ -22,6 +22,7 @@ class PlottedSweep:
 
     panel, series: numbers of the panel and of the series within the run; panel_deg, series_deg:
         their angles in degrees.
+    at: index of each point among those of the run.
     x_deg: angle of each point on the swept axis.
     value, u: BRDF in 1/sr, or radiance in counts/s where there is no white tile.
     residual: in u, less the errors that points share. deviation, u_deviation: difference from the
@@ -36,6 +37,7 @@ class PlottedSweep:
     series: int
     panel_deg: float
     series_deg: float
+    at: IntArray
     x_deg: FloatArray
     value: FloatArray
     u: FloatArray
@@ -118,6 +120,7 @@ def _sweep(data: ReportData, places: _Places, panel: int, series: int) -> Plotte
         series=series,
         panel_deg=float(panel_deg),
         series_deg=float(series_deg),
+        at=at,
         x_deg=x,
         value=value,
         u=u,

@@ -21,6 +21,7 @@ from instrument.config.simulated.defects import (
     Placement,
 )
 from instrument.config.simulated.spread import Share, Signed, Spread
+from instrument.config.uncertainty.rig_lines import RigLines
 
 _RANGES = ("theta_i_deg", "dphi_deg", "theta_r_deg")
 Range = Annotated[list[Finite], Field(min_length=2, max_length=2)]
@@ -142,6 +143,7 @@ class Rig(Section):
     keep_out: list[KeepOut] = Field(default_factory=list)
     camera: AnyCamera
     lamp: LampConfig
+    uncertainty: RigLines = RigLines()
     simulation: Simulation = Simulation()
 
     def mistakes(self) -> Iterator[tuple[str, str]]:

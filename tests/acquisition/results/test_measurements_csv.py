@@ -42,7 +42,7 @@ def reduced(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Reduced]:
 
 
 def text(reduced: Reduced) -> str:
-    return measurements_csv(reduced, 0.01 * reduced.brdf, small_scan())
+    return measurements_csv(reduced, 0.01 * reduced.brdf, reduced.parts, small_scan())
 
 
 def table(reduced: Reduced) -> list[dict[str, str]]:
@@ -120,7 +120,7 @@ def test_the_table_holds_exactly_what_the_fit_takes(tmp_path: Path, slow: bool) 
                 scan(resumed, record)
             found = reduce(record.readings(), loaded.protocol, record.checks())
         path = tmp_path / f"{seed}.csv"
-        path.write_text(measurements_csv(found, 0.01 * found.brdf, loaded))
+        path.write_text(measurements_csv(found, 0.01 * found.brdf, found.parts, loaded))
         read = read_table(path)
         assert read.flagged == np.sum(~found.valid)
         if not np.any(found.valid):
@@ -155,7 +155,7 @@ def test_metadata_follow_in_each_row_and_change_nothing_else(
     except ValidationError:
         return  # begins like a formula
     loaded = changed(small_scan(), metadata=metadata)
-    found = measurements_csv(reduced, 0.01 * reduced.brdf, loaded)
+    found = measurements_csv(reduced, 0.01 * reduced.brdf, reduced.parts, loaded)
     rows = list(csv.DictReader(found.split("\n")))
     facts = {"operator": operator.strip(), "wavelength_nm": "550", "notes": note.strip()}
     without = list(csv.DictReader(text(reduced).split("\n")))

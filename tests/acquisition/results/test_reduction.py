@@ -208,7 +208,7 @@ def test_a_table_of_results_states_the_errors_of_the_tile_s_table(
     loaded = with_tile(full, tabled(table_text(SPECTRALON, 0.003, 0.004), tmp_path))
     found = reduce(seen_with_ptfe, loaded.protocol, ())
     path = tmp_path / "measurements.csv"
-    path.write_text(measurements_csv(found, 0.01 * found.brdf, loaded))
+    path.write_text(measurements_csv(found, 0.01 * found.brdf, found.parts, loaded))
     read, own = (
         [(e.name, e.u_relative.tolist(), e.group.tolist()) for e in m.shared if e.name == TILE]
         for m in (read_table(path).measurements, measurements(found, loaded))

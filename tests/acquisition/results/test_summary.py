@@ -118,7 +118,11 @@ def test_less_rounding_never_costs_u(results: Results) -> None:
 
 def test_the_budget_shares_the_whole_variance(results: Results) -> None:
     _, reduced, fitted, _ = results
-    rows = budget(reduced, fitted.u_brdf(reduced))
+    parts = fitted.parts(reduced)
+    whole = np.sqrt(np.sum([u[fitted.used] ** 2 for u in parts.values()], axis=0))
+    u = fitted.u_brdf(reduced)[fitted.used] / reduced.brdf[fitted.used]
+    assert whole == pytest.approx(u, rel=0.02)  # but for correlations of the angles of one error
+    rows = budget(parts)
     assert sum(share for _, _, share in rows) == pytest.approx(100.0)
     assert [share for _, _, share in rows] == sorted((r[2] for r in rows), reverse=True)
     assert np.all([u >= 0 for _, u, _ in rows])

@@ -15,7 +15,7 @@ def test_the_keys_are_as_documented() -> None:
     written = to_json(found)
     assert json.loads(json.dumps(written, allow_nan=False)) == written
     assert list(written) == [
-        "chosen", "verdict", "reason", "notes", "symmetry", "candidates",
+        "chosen", "verdict", "reason", "notes", "symmetry", "shared_errors", "candidates",
     ]  # fmt: skip
     assert written["symmetry"]["says"] == "smooth"
     assert {c["model"] for c in written["candidates"]} <= set(CANDIDATES)

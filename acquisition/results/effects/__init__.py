@@ -1,0 +1,1 @@
+"""Effects that a rig file states and no command measures: open `rig_effects`."""

@@ -1,0 +1,91 @@
+"""Effect of polarised light, or of a camera that prefers one polarisation.
+
+Light that comes out of the sample's inside has passed its surface twice, and light of the mirror
+side is reflected by facets; both prefer one polarisation, by Fresnel's formulas for an index of
+1.5, which is near that of most dielectrics. The tile is a perfect depolariser. Which part of a
+value the facets reflect is estimated from the values themselves, by a quick fit of a rough matt
+surface with a lobe.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from acquisition.results.effects.effect import Effect, Readings
+from analysis.data.measurements import Measurements
+from analysis.fit.first_fit import FirstFits
+from analysis.models import MODELS
+from analysis.models.smooth.fresnel import reflectances
+from instrument.errors import NotDetermined
+from instrument.geometry import FloatArray, camera_direction, lamp_direction
+
+LAMP, CAMERA = "polarisation of the lamp", "polarisation of the camera"
+_INDEX = 1.5
+_U_FIT = 0.01  # relative, of the values in the quick fit
+
+
+def polarisation_effects(readings: Readings) -> Iterator[Effect]:
+    """Yield the effects whose u the rig file states."""
+    lines = readings.rig.uncertainty
+    if not (lines.u_polarisation_lamp or lines.u_polarisation_camera):
+        return
+    theta_i, theta_r, dphi = readings.angles_deg()
+    to_lamp, to_camera = lamp_direction(theta_i, dphi), camera_direction(theta_r)
+    azimuth = np.radians(-dphi)
+    across_lamp = np.stack([-np.sin(azimuth), np.cos(azimuth), np.zeros(dphi.size)], axis=-1)
+    across_camera = np.broadcast_to([0.0, 1.0, 0.0], across_lamp.shape)
+    facets = _share_of_facets(readings)
+    excess = _reflected_excess(to_lamp, to_camera)
+    for name, u, theta, across, to in (
+        (LAMP, lines.u_polarisation_lamp, theta_i, across_lamp, to_lamp),
+        (CAMERA, lines.u_polarisation_camera, theta_r, across_camera, to_camera),
+    ):
+        if u:
+            mirrored = excess * _alignment(np.cross(to_lamp, to_camera), across, to)
+            body = _transmitted_excess(np.abs(theta))
+            yield Effect(name=name, by_one=(1 - facets) * body + facets * mirrored, u=u)
+
+
+def _share_of_facets(readings: Readings) -> FloatArray:
+    """Share of the values, (N,), that the facets of the surface reflect, by a quick fit.
+
+    It lies between 0 and 1, and is 0 where there are too few points to tell.
+    """
+    theta_i, theta_r, dphi = readings.angles_deg()
+    known = np.isfinite(readings.value) & (readings.value > 0)
+    value = readings.value[known]
+    split, share = MODELS["oren_nayar+torrance_sparrow_lobe"], np.zeros(known.size)
+    try:
+        m = Measurements.bare(theta_i[known], theta_r[known], dphi[known], value, _U_FIT * value)
+        found = FirstFits(m).of(split)
+    except NotDetermined:
+        return share
+    fitted = dict(zip((p.name for p in split.parameters), found.solution.x.tolist(), strict=True))
+    lobe = MODELS["torrance_sparrow_lobe"]
+    facets = lobe.brdf(m.geometry, **{p.name: fitted[p.name] for p in lobe.parameters})
+    share[known] = np.clip(facets / np.maximum(found.brdf(m.geometry), 1e-12), 0.0, 1.0)
+    return share
+
+
+def _transmitted_excess(theta_deg: FloatArray) -> FloatArray:
+    """Relative excess, (N,), of horizontal light that passes the surface at these angles."""
+    para, perp = reflectances(np.radians(theta_deg), _INDEX)
+    return (para - perp) / np.maximum(2 - para - perp, 1e-12)
+
+
+def _reflected_excess(to_lamp: FloatArray, to_camera: FloatArray) -> FloatArray:
+    """Relative excess, (N,), of light across the plane of two directions (N, 3), by a facet."""
+    facing = np.clip(np.sum(to_lamp * to_camera, axis=-1), -1.0, 1.0)
+    para, perp = reflectances(np.arccos(facing) / 2, _INDEX)
+    return np.asarray((perp - para) / (perp + para))
+
+
+def _alignment(perpendicular: FloatArray, across: FloatArray, to: FloatArray) -> FloatArray:
+    """Cosine of twice the angle, (N,), between two directions (N, 3) seen along a third."""
+    sideways = across - np.sum(to * across, axis=-1, keepdims=True) * to
+    length = np.linalg.norm(perpendicular, axis=-1) * np.linalg.norm(sideways, axis=-1)
+    product = np.sum(perpendicular * sideways, axis=-1)
+    cosine = np.divide(product, length, out=np.ones(length.size), where=length > 1e-9)
+    return np.asarray(2 * cosine**2 - 1)

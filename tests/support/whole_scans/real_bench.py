@@ -1,0 +1,158 @@
+"""Runs on the simulated bench with all defects of a real one drawn anew, against the truth.
+
+A run is what a user would measure who has calibrated the bench: the tile has a table with a stated
+u; the camera's response was measured, up to a residual non-linearity. Frames have a quarter of the
+rows and columns, with the sizes of defects in pixels to match: a window's mean is the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquisition.results.fitting import measurements
+from acquisition.results.reduction import reduced_run
+from analysis.data.acceptance import Acceptance, averaged_brdf
+from analysis.data.covariance import full_covariance
+from analysis.fit.fit import fit
+from analysis.models import MODELS
+from instrument.config.load import Loaded, load_protocol
+from instrument.config.protocol import DriftCheck, References, SimulatedSample
+from instrument.config.rig import Rig, Simulation
+from instrument.geometry import FloatArray, Geometry
+from instrument.record.record import Record
+from tests.support.paths import CONFIGS
+from tests.support.scans import changed, shrunk
+from tests.support.white_tiles import table_text, tabled
+from tests.support.whole_scans.coverage_scans import BANDS_DEG
+from tests.support.whole_scans.stopped_scan import scan
+
+SAMPLES = (
+    SimulatedSample(model="oren_nayar", parameters={"albedo": 0.8, "sigma_deg": 30.0}),
+    SimulatedSample(model="oren_nayar", parameters={"albedo": 0.15, "sigma_deg": 20.0}),
+    SimulatedSample(model="lambert+ggx", parameters={"albedo": 0.4, "f0": 0.04, "alpha": 0.35}),
+    SimulatedSample(
+        model="oren_nayar+torrance_sparrow",
+        parameters={"albedo": 0.6, "sigma_deg": 20.0, "ks": 0.076},
+    ),
+)
+INCIDENCES_DEG = ((20.0, 45.0), (30.0, 60.0), (15.0, 65.0), (40.0, 55.0))
+VIEWS_DEG = (-83.0, -78.0, -70.0, -62.0, -50.0, -35.0, -20.0, -5.0, 10.0, 25.0, 50.0, 68.0, 80.0)
+_U_TILE, _U_TILE_COMMON = 0.002, 0.005  # of each value of the table, and of all
+_SHRINK = 4
+_U_LINEARITY = 0.001  # left over by the calibration of the camera's response
+_RINGS = 4  # of the truth's average over lamp and lens
+
+
+@dataclass(frozen=True, slots=True)
+class Pulls:
+    """(value - truth) / u of one run: of points (N,), and of fitted parameters with a u.
+
+    theta_r_deg, relative: view angles (N,), and relative deviations (N,) of the points.
+    """
+
+    theta_r_deg: FloatArray
+    points: FloatArray
+    relative: FloatArray
+    parameters: dict[str, float]
+
+
+def real_bench_run(
+    number: int, folder: Path, frames: int = 2, lines: dict[str, Any] | None = None
+) -> Loaded:
+    """Configuration of run `number`, which is its seed; `lines` replace some of the rig's."""
+    loaded = load_protocol(
+        CONFIGS / "protocols" / "demo.yaml", CONFIGS / "rigs" / "bench_real.yaml"
+    )
+    small = shrunk(loaded, _SHRINK)
+    sweep = {
+        "theta_i_deg": list(INCIDENCES_DEG[number // len(SAMPLES) % len(INCIDENCES_DEG)]),
+        "dphi_deg": [0.0],
+        "theta_r_deg": list(VIEWS_DEG),
+    }
+    rig = _drawn_rig(small.rig, number, lines or {})
+    tile = rig.simulation.tile
+    assert tile is not None
+    new = tile.model_copy(update={"aged": 0.0})
+    text = table_text(new, _U_TILE, _U_TILE_COMMON, np.random.default_rng([number, 3]))
+    references = References(
+        white_tile=tabled(text, folder, frames=4),
+        drift_check=DriftCheck(theta_r_deg=10.0, every_points=7),
+    )
+    return changed(
+        small,
+        rig={"uncertainty": rig.uncertainty, "simulation": rig.simulation},
+        sweeps=[sweep],
+        references=references,
+        frames_per_point=frames,
+        simulated_sample=SAMPLES[number % len(SAMPLES)],
+    )
+
+
+def _drawn_rig(rig: Rig, seed: int, lines: dict[str, Any]) -> Rig:
+    """The rig with its defects drawn, for pictures of fewer pixels, and a calibrated camera."""
+    own = rig.simulation.model_dump()
+    own |= {"seed": seed, "drawn": True}
+    own["camera_defects"]["prnu"] /= _SHRINK
+    own["camera_defects"]["nonlinearity"] = _U_LINEARITY
+    for section, names in (
+        (own["lens_defects"], ("axis_column_px", "axis_row_px", "defocus_px")),
+        (own["axis_defects"]["theta_r"], ("sag_px", "wobble_px")),
+    ):
+        for name in names:
+            section[name] /= _SHRINK
+    stated = {"u_linearity": _U_LINEARITY}
+    if rig.uncertainty.u_pixel_response:
+        stated["u_pixel_response"] = rig.uncertainty.u_pixel_response / _SHRINK
+    known = rig.uncertainty.model_copy(update={**stated, **lines})
+    update = {"simulation": Simulation.model_validate(own), "uncertainty": known}
+    return rig.model_copy(update=update)
+
+
+def pulls_of(loaded: Loaded, folder: Path) -> Pulls:
+    """Scan, reduce, and fit the true model; compare with the truth."""
+    with Record.create(folder, {}) as record:
+        scan(loaded, record)
+        m = measurements(reduced_run(record, loaded), loaded)
+    sample = loaded.protocol.simulated_sample
+    assert sample is not None
+
+    def true_model(geometry: Geometry) -> FloatArray:
+        return MODELS[sample.model].brdf(geometry, **sample.parameters)
+
+    acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
+    angles = (m.theta_i_deg, m.theta_r_deg, m.dphi_deg)
+    truth = averaged_brdf(true_model, *angles, acceptance, _RINGS)
+    fitted = fit(MODELS[sample.model], m, acceptance)
+    return Pulls(
+        m.theta_r_deg,
+        (m.brdf - truth) / full_covariance(m, true_model).u_total,
+        m.brdf / truth - 1,
+        {
+            name: (fitted.values[name] - sample.parameters[name]) / u
+            for name, u in fitted.u.items()
+            if u is not None
+        },
+    )
+
+
+def by_band(found: list[Pulls]) -> dict[str, FloatArray]:
+    """Deviations of all points of each band of view angle, in u, by the band's name."""
+    theta_r = np.abs(np.concatenate([one.theta_r_deg for one in found]))
+    points = np.concatenate([one.points for one in found])
+    return {
+        f"{low:g} to {high:g} deg": points[(low <= theta_r) & (theta_r < high)]
+        for low, high in BANDS_DEG
+    }
+
+
+def by_parameter(found: list[Pulls]) -> dict[str, FloatArray]:
+    """Deviations of fitted parameters, in u, by name over all samples."""
+    names = sorted({name for one in found for name in one.parameters})
+    return {
+        name: np.array([one.parameters[name] for one in found if name in one.parameters])
+        for name in names
+    }
