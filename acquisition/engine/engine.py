@@ -28,6 +28,7 @@ from acquisition.interlocks.watched_camera import WatchedCamera
 from acquisition.measure.drift import is_usable
 from acquisition.measure.placement import Placement
 from acquisition.measure.radiometry import Signal, measure
+from acquisition.measure.stray_light import View, with_dark_patch
 from acquisition.measure.window import Window, window_at
 from acquisition.plan.moves import NoPathError
 from acquisition.plan.plan import Plan, Step
@@ -317,6 +318,8 @@ class Engine:
         signal = self._scatter.judged(
             signal, exposed.frames, exposed.dark, window, f"step {exposed.step.index}"
         )
+        view = View(rig, self._protocol.window, theta_i_deg, exposed.step.pose.theta_r)
+        signal = with_dark_patch(signal, exposed.frames, exposed.dark, view)
         return _reading(exposed, signal)
 
     def _add_event(self, kind: str, text: str) -> None:

@@ -51,6 +51,7 @@ class Signal:
     `u_placement_dn` is the first-order effect of a misplaced sample, with the sign of the change
     for a sample too close to the camera; `u_texture_dn` is the second-order effect, with the effect
     of hot and dead pixels left out and of single saturated ones. `window_pixels`: area that counts.
+    `patch_dn` and what follows it: see `acquisition.measure.stray_light`.
     """
 
     signal_dn: float
@@ -63,6 +64,14 @@ class Signal:
     saturated_pixels: int
     peak_dn: float
     flags: str
+    patch_dn: float = 0.0
+    u_patch_dn: float = 0.0
+    near_window_dn: float = 0.0
+    middle_window_dn: float = 0.0
+    far_window_dn: float = 0.0
+    near_patch_dn: float = 0.0
+    middle_patch_dn: float = 0.0
+    far_patch_dn: float = 0.0
 
 
 def average_dark(frames: Sequence[Frame], camera: CameraConfig) -> Dark:

@@ -44,10 +44,16 @@ class Window:
 
 
 @lru_cache(maxsize=512)
-def window_at(theta_r_deg: float, pinhole: Pinhole, width_mm: float, height_mm: float) -> Window:
-    """Return the window of a patch centred on the axis, seen from theta_r (signed)."""
+def window_at(
+    theta_r_deg: float,
+    pinhole: Pinhole,
+    width_mm: float,
+    height_mm: float,
+    centre_mm: tuple[float, float] = (0.0, 0.0),
+) -> Window:
+    """Return the window of a patch, centred at (x, y) from the axis, seen from theta_r (signed)."""
     homography = pinhole.homography(theta_r_deg)
-    outline = apply_homography(homography, rectangle_mm(width_mm, height_mm))
+    outline = apply_homography(homography, rectangle_mm(width_mm, height_mm) + centre_mm)
     coverage = polygon_coverage(outline, pinhole.width_px, pinhole.height_px)
     rows, columns = np.ogrid[coverage.crop]
     area = coverage.fraction * area_per_pixel_mm2(homography, columns, rows)

@@ -19,8 +19,10 @@ from acquisition.interlocks.lamp_checks import UNPROVEN, doubtful_steps
 from acquisition.interlocks.no_light import NO_SIGNAL, unlit_steps
 from acquisition.measure.drift import Drift, rate
 from acquisition.measure.placement import tilt_deg
+from acquisition.measure.scattering import StrayLight, stray_light
 from acquisition.measure.white_tile import Standard, standard
 from acquisition.results.effects.effect import Readings
+from acquisition.results.effects.lens import STRAY
 from acquisition.results.effects.rig_effects import has_effects, rig_effects, tiles_of
 from analysis.data.measurements import SharedError
 from analysis.fit.certificate import CERTIFICATE
@@ -118,9 +120,14 @@ def reduced_run(record: Record, loaded: Loaded) -> Reduced:
     """Return radiance and BRDF of all points in a run's record, complete or not."""
     readings = record.readings()
     doubted = doubted_steps(readings, record.events())
-    reduced = reduce(readings, loaded.protocol, record.checks(), doubted)
+    stray = stray_light(readings, loaded.rig)
+    own = readings if stray is None else stray.subtracted(readings)
+    reduced = reduce(own, loaded.protocol, record.checks(), doubted)
+    if stray is not None:
+        errors = _stray_light_errors(reduced.points, _tile_readings(own), stray)
+        reduced = replace(reduced, shared=(*reduced.shared, *errors))
     if has_effects(loaded.rig.uncertainty):
-        reduced = with_rig_effects(reduced, readings, loaded)
+        reduced = with_rig_effects(reduced, own, loaded)
     measured = loaded.rig.camera.measured
     if measured is None:
         return reduced
@@ -200,9 +207,8 @@ def reduce(
     }
     placements = _placements(sorted(readings, key=lambda r: r.time_s))
     tiles = {
-        r.lamp_setting: _tile(r, drifts[r.block], placements[r.step], doubts)
-        for r in sorted(readings, key=lambda r: -r.step)
-        if r.kind == "tile"  # the first of each setting; one at its end only confirms it
+        setting: _tile(r, drifts[r.block], placements[r.step], doubts)
+        for setting, r in _tile_readings(readings).items()
     }
     radiance = np.array([rate(p) / drifts[p.block].at(p.time_s) for p in points])
     tile = standard_of(points, protocol)
@@ -246,6 +252,27 @@ def standard_of(points: Sequence[Reading], protocol: Protocol) -> Standard | Non
         return None
     theta_i, dphi = (np.array([getattr(p, n) for p in points]) for n in ("theta_i_deg", "dphi_deg"))
     return standard(tile, theta_i, dphi)
+
+
+def _tile_readings(readings: Sequence[Reading]) -> dict[int, Reading]:
+    """Return the tile's first reading at each lamp setting; one at its end only confirms it."""
+    last_first = sorted(readings, key=lambda r: -r.step)
+    return {r.lamp_setting: r for r in last_first if r.kind == "tile"}
+
+
+def _stray_light_errors(
+    points: Sequence[Reading], tiles: Mapping[int, Reading], stray: StrayLight
+) -> tuple[SharedError, ...]:
+    """Errors of the stray light: of how far the lens scatters it, and so the same in all readings.
+
+    With a tile only the difference counts: what is too much in both leaves the ratio as it is.
+    """
+    errors = stray.errors_of(points) / np.array([p.signal_dn or np.nan for p in points])
+    for setting, tile in tiles.items():
+        own = np.array([p.lamp_setting == setting for p in points], dtype=bool)
+        errors[:, own] -= stray.errors_of([tile]) / (tile.signal_dn or np.nan)
+    alike = np.zeros(len(points), dtype=np.int64)
+    return tuple(SharedError(STRAY, u, alike) for u in errors)
 
 
 def _relative(points: Sequence[Reading], name: str) -> FloatArray:

@@ -28,6 +28,27 @@ def _linear_counts_dn(curve: ResponseCurve, black_dn: float, max_dn: int) -> NDA
     return black_dn + span * curve.light((np.arange(max_dn + 1.0) - black_dn) / span)
 
 
+class DarkPatch(Section):
+    """Patch beside the sample that reflects almost nothing: a light trap, or black velvet.
+
+    `x_mm`, `y_mm`: its middle in the plane of the sample, from the rotation axis. `width_mm`,
+    `height_mm`: its size, of which the middle half is read. `reflectance`: its radiance factor,
+    with the standard uncertainty `u_reflectance`.
+    """
+
+    x_mm: Finite
+    y_mm: Finite
+    width_mm: Positive
+    height_mm: Positive
+    reflectance: Annotated[float, Field(ge=0, le=0.05)]
+    u_reflectance: Annotated[float, Field(ge=0, le=0.05)]
+
+    def corners_mm(self) -> NDArray[np.float64]:
+        """Return the corners (4, 2) in mm, as (x, y) in the plane of the sample."""
+        signs = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+        return signs * (self.width_mm, self.height_mm) + (self.x_mm, self.y_mm)
+
+
 class CameraConfig(Section):
     """Camera on the beam: image, field of view, sensor and exposure.
 
@@ -35,6 +56,7 @@ class CameraConfig(Section):
     `u_black_level_dn`: standard deviation of the black level from frame to frame; the default is
     that of a clamp which regulates to a fraction of a count. `calibration`: file of `gonio
     calibrate camera`, beside the rig file; counts are made linear with its response curve.
+    `dark_patch`: its light is stray light, which is subtracted.
     """
 
     width_px: Annotated[int, Field(ge=16, le=16384)]
@@ -54,6 +76,7 @@ class CameraConfig(Section):
     frame_overhead_s: NotNegative
     reconnect_s: Annotated[float, Field(ge=0, le=3600)] = 30.0
     calibration: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
+    dark_patch: DarkPatch | None = None
     _measured: CameraCalibration | None = PrivateAttr(None)
 
     @property
@@ -89,6 +112,7 @@ class CameraConfig(Section):
             value = getattr(self, key)
             if not 0 <= value <= size - 1:
                 yield key, f"{value:g} is outside the image; allowed: 0 to {size - 1}"
+        yield from self._patch_outside()
         if self.black_level_dn >= self.max_dn / 2:
             yield (
                 "black_level_dn",
@@ -101,6 +125,22 @@ class CameraConfig(Section):
                 f"{self.black_level_dn:g}; allowed: at least {least:.3g}, 4 times the read noise "
                 "in counts, or darks are clipped at 0",
             )
+
+    def _patch_outside(self) -> Iterator[tuple[str, str]]:
+        """Yield a dark patch that leaves the picture seen along the normal; roll is left aside."""
+        patch = self.dark_patch
+        if patch is None:
+            return
+        per_mm = self.width_px / self.field_width_mm
+        for middle, extent, axis, size, sign in (
+            (patch.x_mm, patch.width_mm, self.axis_column_px, self.width_px, 1.0),
+            (patch.y_mm, patch.height_mm, self.axis_row_px, self.height_px, -1.0),
+        ):
+            ends = [axis + sign * per_mm * (middle + side * extent / 2) for side in (-1.0, 1.0)]
+            if min(ends) < -0.5 or max(ends) > size - 0.5:
+                text = f"from {middle - extent / 2:g} to {middle + extent / 2:g} mm leaves the "
+                low, high = sorted((n - axis) / (sign * per_mm) for n in (-0.5, size - 0.5))
+                yield "dark_patch", f"{text}picture; allowed: {low:.3g} to {high:.3g} mm"
 
     @property
     def max_dn(self) -> int:

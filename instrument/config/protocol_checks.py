@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from instrument.config.axes import AXES, EMULATED, Axis
+from instrument.config.camera import DarkPatch
 from instrument.config.protocol import Angles, Degrees, DriftCheck, Steps, WhiteTile, angles_deg
 from instrument.config.section import Finite, Name, Positive
 from instrument.config.yaml_positions import KeyPath, MarkedYaml
@@ -29,6 +30,7 @@ _DEGREES: TypeAdapter[Any] = TypeAdapter(Degrees)
 _ANGLES: TypeAdapter[Any] = TypeAdapter(Angles)
 _AXIS: TypeAdapter[Any] = TypeAdapter(Axis)
 _POSITIVE: TypeAdapter[Any] = TypeAdapter(Positive)
+_PATCH: TypeAdapter[Any] = TypeAdapter(DarkPatch)
 _NAME: TypeAdapter[Any] = TypeAdapter(Name)
 _PARAMETERS: TypeAdapter[Any] = TypeAdapter(dict[str, Finite])
 
@@ -48,6 +50,7 @@ def rig_mistakes(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -> Mistak
                     f"{limits.min_deg:g} to {limits.max_deg:g} deg ({place})",
                 )
     yield from _window_past_picture(protocol, rig, rig_name)
+    yield from _patch_covered(protocol, rig, rig_name)
     scene = rig.get(("camera", "driver")) == "simulated" or (
         rig.get(("camera", "device")) == EMULATED
     )
@@ -156,6 +159,23 @@ def _window_past_picture(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -
             place = f"{rig_name}:{rig.mark(('camera', 'field_width_mm')).line}"
             text = f"{window:g} mm is larger than the camera's field; allowed: at most {size:g} mm"
             yield ("window", key), f"{text} ({place})"
+
+
+def _patch_covered(protocol: MarkedYaml, rig: MarkedYaml, rig_name: str) -> Mistakes:
+    """Yield a sample or tile that lies over the camera's dark patch."""
+    patch = _valid(_PATCH, rig, "camera", "dark_patch")
+    if patch is None:
+        return
+    for path in (("sample",), ("references", "white_tile")):
+        size = [_valid(_POSITIVE, protocol, *path, key) for key in ("width_mm", "height_mm")]
+        if None in size:
+            continue
+        free = [2 * abs(patch.x_mm) - patch.width_mm, 2 * abs(patch.y_mm) - patch.height_mm]
+        if all(own > limit for own, limit in zip(size, free, strict=True)):
+            key = "width_mm" if free[0] > free[1] else "height_mm"
+            place = f"{rig_name}:{rig.mark(('camera', 'dark_patch')).line}"
+            text = f"{max(free):g} mm, or the dark patch is covered ({place})"
+            yield (*path, key), f"{size[key == 'height_mm']:g} mm; allowed: at most {text}"
 
 
 def _repeated(protocol: MarkedYaml) -> Mistakes:

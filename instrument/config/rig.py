@@ -153,6 +153,13 @@ class Rig(Section):
             what = ", ".join(f"{name} is {kind}" for name, kind in kinds.items())
             yield "axes", f"{what}; allowed: all simulated, all emulated or all real"
         yield from self._port_conflicts()
+        lines = self.uncertainty
+        if self.camera.dark_patch is not None and (lines.stray_light or lines.u_stray_light):
+            yield (
+                "uncertainty",
+                f"stray_light {lines.stray_light:g}, u_stray_light {lines.u_stray_light:g}; "
+                "allowed with a dark_patch of the camera, which measures it: neither",
+            )
         for text in self.simulation.outside(self.camera.width_px, self.camera.height_px):
             yield "simulation", text
 

@@ -1,7 +1,7 @@
 """Schemas of earlier versions of the program, whose records still open, resume and report.
 
-No row has a seal. The tables of version 3 have no rules either, so `validation` checks every value
-by a query. A record keeps the schema with which it was created.
+Only the rows of version 5 have a seal. The tables of version 3 have no rules either, so
+`validation` checks every value by a query. A record keeps the schema with which it was created.
 """
 
 from instrument.record.schema import tables_sql
@@ -34,5 +34,5 @@ CREATE TABLE drift_at_resume (before_step INTEGER NOT NULL, expected REAL NOT NU
                               step INTEGER NOT NULL, {_READING_3});
 """
 
-OLDER_SQL = {3: _SQL_3, 4: tables_sql(seals=False)}
+OLDER_SQL = {3: _SQL_3, 4: tables_sql(4), 5: tables_sql(5)}
 """The statements that make the tables, by schema version."""

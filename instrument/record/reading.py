@@ -23,7 +23,10 @@ class Reading:
     from the height of the surface above the axis (signed: one placement shifts all its readings
     together; without the part that depends on the reflectance), and `u_texture_dn` from the texture
     at the window's edge, to second order of the placement, and from hot pixels, which are left out,
-    and saturated ones. `window_pixels`: the area that counts.
+    and saturated ones. `window_pixels`: the area that counts. `patch_dn`: level of the rig's dark
+    patch, dark subtracted, with the u of its noise; the six after it: what would fall into window
+    and patch if the lens scattered all light of the picture near by, farther and far, see
+    `acquisition.measure.stray_light`. All are 0 without a patch. Stray light is in `signal_dn`.
     `lamp_setting` counts the positions of the lamp, `block` the times that it was set by hand.
     `time_s` is the scan time at the middle of the frames, without interruptions of the scan;
     `free_s` is the time at which the rig could move on, the dark having been taken.
@@ -52,6 +55,14 @@ class Reading:
     free_s: float
     time_utc: str
     flags: str
+    patch_dn: float = 0.0
+    u_patch_dn: float = 0.0
+    near_window_dn: float = 0.0
+    middle_window_dn: float = 0.0
+    far_window_dn: float = 0.0
+    near_patch_dn: float = 0.0
+    middle_patch_dn: float = 0.0
+    far_patch_dn: float = 0.0
 
     @property
     def u_light_dn(self) -> float:

@@ -12,7 +12,7 @@ import math
 import sqlite3
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import astuple
+from dataclasses import astuple, fields
 from os.path import samestat
 from pathlib import Path
 from typing import Any
@@ -30,11 +30,11 @@ from instrument.record.folder_lock import FolderLock
 from instrument.record.reading import Check, Preview, Reading
 from instrument.record.schema import (
     SCHEMA_VERSION,
-    TABLES,
     connect,
     create_tables,
     has_seals,
     require_support,
+    tables_of,
 )
 from instrument.record.seal import Damaged, sealed, storable
 from instrument.record.validation import check_files, check_schema, check_values
@@ -44,7 +44,7 @@ from instrument.text.atomic_file import disk_full, explain_os_error, make_folder
 
 FILE_NAME = "record.sqlite"
 Rows = Sequence[Sequence[object]]
-_NAMES = {table: [c.name for c in columns] for table, columns in TABLES.items()}
+_READING = [field.name for field in fields(Reading)]
 _SAVED = "the accepted readings have been moved into the database and are safe"
 _LOST = "the latest readings, which only it held, are lost and have to be measured again"
 _TAKEN = "--out must be absent or an empty folder: name another, or leave it out"
@@ -258,9 +258,13 @@ class Record(Closeable):
         self.writing.wait()
         left_out = ", ".join(map(str, self._damaged.get(table, ())))
         yield from self._db.execute(
-            f"SELECT {', '.join(_NAMES[table])} FROM {table} NOT INDEXED "
+            f"SELECT {', '.join(self._names(table))} FROM {table} NOT INDEXED "
             f"WHERE rowid NOT IN ({left_out}) ORDER BY {order}"
         )
+
+    def _names(self, table: str) -> list[str]:
+        """Return the columns of a table in the record's version, its seal apart."""
+        return [column.name for column in tables_of(self._version)[table]]
 
     def _write(self, tables: Mapping[str, Rows], *, replace: bool = False) -> None:
         """Insert rows into tables in one transaction."""
@@ -275,9 +279,10 @@ class Record(Closeable):
     def _insert(self, table: str, rows: Rows, *, replace: bool) -> None:
         """Insert rows in the transaction that is open, sealed if the record's version has seals."""
         seals = has_seals(self._version)
-        marks = ", ".join("?" * (len(_NAMES[table]) + seals))
-        texts = [storable(row) for row in rows]
-        whole = [sealed(table, row) if seals else row for row in texts]
+        count = len(self._names(table))
+        marks = ", ".join("?" * (count + seals))
+        texts = [storable(row[:count]) for row in rows]
+        whole = [sealed(table, row, self._version) if seals else row for row in texts]
         sql = f"INSERT{' OR REPLACE' * replace} INTO {table} VALUES ({marks})"
         self._db.executemany(sql, whole)
 
@@ -390,6 +395,6 @@ def _no_run(path: Path) -> str:
 
 
 def _reading(row: Iterable[Any]) -> Reading:
-    """Return a row as a reading; SQLite stores NaN as NULL."""
+    """Return a row as a reading; SQLite stores NaN as NULL, and older rows are shorter."""
     values: list[Any] = [math.nan if value is None else value for value in row]
-    return Reading(**dict(zip(_NAMES["reading"], values, strict=True)))
+    return Reading(**dict(zip(_READING, values, strict=False)))

@@ -20,8 +20,8 @@ from instrument.record.reading import Kind
 from instrument.record.write_lock import TRY_S
 from instrument.text.network_share import network_share
 
-SCHEMA_VERSION = 5
-FIRST_STRICT, _FIRST_SEALED = 4, 5  # schema versions
+SCHEMA_VERSION = 6
+FIRST_STRICT, _FIRST_SEALED, _FIRST_STRAY_LIGHT = 4, 5, 6  # schema versions
 MOST_BYTES = 128 * 1024**2  # of one text or picture; the largest camera's picture needs half of it
 LEAST_SQLITE = (3, 37, 0)  # the first with STRICT tables
 _OPENING_S = 2.0  # of waiting for a lock; nothing moves yet
@@ -99,6 +99,16 @@ _META_VALUE = Column(
     "a whole number of up to 9 digits for steps, hidden, else text in UTF-8",
 )
 _EXPOSURE_S = _number("exposure_s", 1e-9, 1e6)
+_STRAY_LIGHT = (
+    _number("patch_dn"),
+    _number("u_patch_dn", 0.0),
+    _number("near_window_dn"),
+    _number("middle_window_dn"),
+    _number("far_window_dn"),
+    _number("near_patch_dn"),
+    _number("middle_patch_dn"),
+    _number("far_patch_dn"),
+)
 _READING = (
     _integer("step"),
     _word("kind", get_args(Kind)),
@@ -123,6 +133,7 @@ _READING = (
     _number("free_s", optional=True),
     _plain("time_utc"),
     _plain("flags"),
+    *_STRAY_LIGHT,
 )
 TABLES: dict[str, tuple[Column, ...]] = {
     "meta": (_text("key"), _META_VALUE),
@@ -152,9 +163,22 @@ TABLES: dict[str, tuple[Column, ...]] = {
 """All tables with their columns; the first column identifies a row in messages."""
 
 
-def tables_sql(*, seals: bool) -> str:
-    """Return the statements that make the tables, each ending in a semicolon."""
-    return "".join(_create(name, (*own, SEAL) if seals else own) for name, own in TABLES.items())
+def tables_of(version: int) -> dict[str, tuple[Column, ...]]:
+    """Return the tables of a schema version; the columns that came later are always the last."""
+    if version >= _FIRST_STRAY_LIGHT:
+        return TABLES
+    return {name: tuple(c for c in own if c not in _STRAY_LIGHT) for name, own in TABLES.items()}
+
+
+def tables_sql(version: int) -> str:
+    """Return the statements that make the tables of a version, each ending in a semicolon."""
+    seal = (SEAL,) if has_seals(version) else ()
+    return "".join(_create(name, (*own, *seal)) for name, own in tables_of(version).items())
+
+
+def has_seals(version: int) -> bool:
+    """Return True for a schema version whose rows are sealed."""
+    return version >= _FIRST_SEALED
 
 
 def _create(table: str, columns: tuple[Column, ...]) -> str:
@@ -164,12 +188,7 @@ def _create(table: str, columns: tuple[Column, ...]) -> str:
     return f"CREATE TABLE {table} (\n  " + ",\n  ".join(rows) + "\n) STRICT;\n"
 
 
-SQL = tables_sql(seals=True)
-
-
-def has_seals(version: int) -> bool:
-    """Return True for a schema version whose rows are sealed."""
-    return version >= _FIRST_SEALED
+SQL = tables_sql(SCHEMA_VERSION)
 
 
 def require_support(folder: Path) -> None:

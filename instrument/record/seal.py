@@ -13,7 +13,7 @@ import sqlite3
 import zlib
 from collections.abc import Sequence
 
-from instrument.record.schema import ASSIGNED, SEAL, TABLES, Column
+from instrument.record.schema import ASSIGNED, SCHEMA_VERSION, SEAL, Column, tables_of
 
 Damaged = dict[str, tuple[int, ...]]
 """SQLite's row numbers of the damaged rows, by table."""
@@ -26,28 +26,31 @@ def storable(row: Sequence[object]) -> tuple[object, ...]:
     )
 
 
-def sealed(table: str, row: Sequence[object]) -> tuple[object, ...]:
-    """Return a row with its seal, as it is inserted."""
-    columns = TABLES[table]
+def sealed(table: str, row: Sequence[object], version: int = SCHEMA_VERSION) -> tuple[object, ...]:
+    """Return a row with its seal, as it is inserted into a record of that schema version."""
+    columns = tables_of(version)[table]
     stored = [_stored(c, v) for c, v in zip(columns, row, strict=True) if c is not ASSIGNED]
     return (*row, _seal(stored))
 
 
-def damaged_rows(database: sqlite3.Connection) -> Damaged:
+def damaged_rows(database: sqlite3.Connection, version: int = SCHEMA_VERSION) -> Damaged:
     """Return the rows whose values are not those that were sealed; tables without one are absent.
 
     Values are read from the tables themselves, not from an index, which may be damaged as well.
     """
     texts, database.text_factory = database.text_factory, bytes  # damaged text may be no UTF-8
     try:
-        found = {table: _damaged(database, table) for table in TABLES}
+        tables = tables_of(version)
+        found = {name: _damaged(database, name, columns) for name, columns in tables.items()}
     finally:
         database.text_factory = texts
     return {table: rows for table, rows in found.items() if rows}
 
 
-def _damaged(database: sqlite3.Connection, table: str) -> tuple[int, ...]:
-    names = ", ".join(c.name for c in TABLES[table] if c is not ASSIGNED)
+def _damaged(
+    database: sqlite3.Connection, table: str, columns: Sequence[Column]
+) -> tuple[int, ...]:
+    names = ", ".join(c.name for c in columns if c is not ASSIGNED)
     rows = database.execute(f"SELECT rowid, {SEAL.name}, {names} FROM {table} NOT INDEXED")
     return tuple(rowid for rowid, seal, *values in rows if seal != _seal(values))
 

@@ -22,7 +22,14 @@ from pathlib import Path
 
 from instrument.errors import InputError
 from instrument.record.older_versions import OLDER_SQL
-from instrument.record.schema import FIRST_STRICT, SCHEMA_VERSION, SQL, TABLES, has_seals
+from instrument.record.schema import (
+    FIRST_STRICT,
+    SCHEMA_VERSION,
+    SQL,
+    TABLES,
+    has_seals,
+    tables_of,
+)
 from instrument.record.seal import Damaged, damaged_rows
 
 MOST_READINGS = 2_000_000
@@ -135,10 +142,11 @@ def check_values(database: sqlite3.Connection, path: Path, version: int) -> Dama
     """
     faults = [str(text) for (text,) in database.execute("PRAGMA quick_check") if text != "ok"]
     structure = [text for text in faults if not _OF_A_VALUE.match(text)]
-    damaged = damaged_rows(database) if has_seals(version) and not structure else {}
+    sealed = has_seals(version) and not structure
+    damaged = damaged_rows(database, version) if sealed else {}
     enforced = version >= FIRST_STRICT and not faults
     problems = chain(
-        () if enforced else _wrong_values(database, damaged),
+        () if enforced else _wrong_values(database, damaged, version),
         () if damaged else (f"is damaged ({text[:200]})" for text in structure or faults),
         _without_replacement(damaged),
         _too_many(database, damaged),
@@ -161,9 +169,9 @@ def _sound(table: str, damaged: Damaged) -> str:
     return f"{table} NOT INDEXED WHERE rowid NOT IN ({', '.join(map(str, damaged.get(table, ())))})"
 
 
-def _wrong_values(database: sqlite3.Connection, damaged: Damaged) -> Iterator[str]:
+def _wrong_values(database: sqlite3.Connection, damaged: Damaged, version: int) -> Iterator[str]:
     """Yield the first value of each column that breaks the column's rule."""
-    for table, columns in TABLES.items():
+    for table, columns in tables_of(version).items():
         key = _short(columns[0].name)
         for column in columns:
             wrong = f"{_sound(table, damaged)} AND NOT {column.full_condition()} LIMIT 1"

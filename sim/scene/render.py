@@ -49,6 +49,7 @@ def electrons_per_s(scene: Scene) -> FloatImage:
     image = np.full(
         (rig.camera.height_px, rig.camera.width_px), _background_radiance(scene), dtype=np.float32
     )
+    _show_dark_patch(image, scene)
     crop = projection.outline.crop
     if projection.outline.fraction.size and scene.mounted is not None:
         covered = projection.outline.fraction.astype(np.float32)
@@ -73,11 +74,28 @@ def _project(scene: Scene) -> _Projection:
     )
 
 
+def _show_dark_patch(image: FloatImage, scene: Scene) -> None:
+    """Draw the dark patch of the sample holder, which lies on the table, into a picture of it."""
+    patch, pinhole = scene.rig.camera.dark_patch, Pinhole.of(scene.rig)
+    if patch is None:
+        return
+    table = scene.picture_shift() @ pinhole.homography(scene.table_angles().theta_r)
+    corners = apply_homography(table, patch.corners_mm())
+    outline = polygon_coverage(corners, pinhole.width_px, pinhole.height_px)
+    radiance_of_patch = _matt_radiance(scene, scene.patch_reflectance(patch))
+    covered = outline.fraction.astype(np.float32)
+    image[outline.crop] += covered * (np.float32(radiance_of_patch) - image[outline.crop])
+
+
 def _background_radiance(scene: Scene) -> float:
     """Radiance of the dark optical table behind the sample, taken as Lambertian."""
-    simulation = scene.rig.simulation
+    return _matt_radiance(scene, scene.rig.simulation.background_reflectance)
+
+
+def _matt_radiance(scene: Scene, reflectance: float) -> float:
+    """Radiance of a matt surface on the table, for irradiance 1 at normal incidence."""
     cos_i = max(0.0, float(np.cos(np.radians(scene.seen_angles().theta_i))))
-    return simulation.background_reflectance / np.pi * (cos_i + simulation.wall_light)
+    return reflectance / np.pi * (cos_i + scene.rig.simulation.wall_light)
 
 
 def _surface_radiance(scene: Scene, projection: _Projection) -> FloatImage:

@@ -18,6 +18,7 @@ import numpy as np
 from analysis.accuracy.render_brdf import adequate_brdf
 from analysis.models import MODELS
 from instrument.clock import Clock
+from instrument.config.camera import DarkPatch
 from instrument.config.protocol import PatchConfig, Protocol, Sample, SimulatedSample, WhiteTile
 from instrument.config.rig import Rig
 from instrument.config.simulated.defects import Placement
@@ -212,6 +213,11 @@ class Scene:
             raise ValueError("the reflectance of a white tile is asked for, but there is none")
         error = tile.u_reflectance * self.random(stream_key("white tile")).standard_normal()
         return float(min(1.0, tile.reflectance + error))
+
+    def patch_reflectance(self, patch: DarkPatch) -> float:
+        """Return the true radiance factor of the dark patch: the stated one plus a random error."""
+        error = patch.u_reflectance * self.random(stream_key("dark patch")).standard_normal()
+        return float(max(0.0, patch.reflectance + error))
 
     def age_s(self) -> float:
         """Return the time since the start of the scan, in seconds, without interruptions."""

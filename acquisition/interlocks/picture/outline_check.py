@@ -13,7 +13,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.interlocks.picture.edges import find_edges
+from acquisition.interlocks.picture.edges import find_edges, outward_normal
 from acquisition.interlocks.picture.outline import (
     LIMIT_SIGMA,
     Comparison,
@@ -86,7 +86,12 @@ class OutlineCheck:
         outline = Outline(pinhole, theta_r_deg, self.surfaces[surface], known)
         scale = pinhole.focal_px / pinhole.beam_length_mm
         range_dn = camera.black_level_dn, SATURATION_FRACTION * camera.max_dn
-        return Comparison(outline, find_edges(image, range_dn, outline.corners_px(), scale))
+        corners = outline.corners_px()
+        edges = find_edges(image, range_dn, corners, scale)
+        if camera.dark_patch is not None:
+            patch = pinhole.project(camera.dark_patch.corners_mm(), theta_r_deg).mean(axis=0)
+            edges = [edge for edge in edges if not _faces(corners, edge.index, patch)]
+        return Comparison(outline, edges)
 
     def contradiction(self, image: NDArray[Any], step: Step) -> str:
         """Return how an image (rows, columns) in DN contradicts the pose; empty if it does not."""
@@ -141,6 +146,17 @@ class OutlineCheck:
                     "the table?"
                 )
         return _best_explanation(found)
+
+
+def _faces(corners_px: FloatArray, index: int, point_px: FloatArray) -> bool:
+    """Return True if a point (2,) outside a quadrilateral (4, 2) lies in front of that edge.
+
+    The dark patch has an edge of its own there, which may be the more distinct one.
+    """
+    start = corners_px[index]
+    along = corners_px[(index + 1) % 4] - start
+    outside = float(np.dot(outward_normal(corners_px, index), point_px - start)) > 0
+    return outside and 0 <= float(np.dot(along, point_px - start) / np.dot(along, along)) <= 1
 
 
 def _uncertainty(rig: Rig, protocol: Protocol, surface: Rectangle) -> Deviation:

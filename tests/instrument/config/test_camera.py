@@ -3,7 +3,7 @@
 import pytest
 
 from instrument.config.camera import V4l2CameraConfig
-from tests.support.config.texts import RIG, changed, problems
+from tests.support.config.texts import RIG, changed, load, problems
 
 
 def test_two_mistakes_of_a_camera_are_both_reported() -> None:
@@ -74,3 +74,24 @@ def test_a_hot_pixel_outside_the_image_is_refused() -> None:
     for place in ("row 320, column 1", "row 1, column 640"):
         text = f"hot pixel in {place}; allowed: rows up to 319, columns up to 639"
         assert any(problem.endswith(text) for problem in found)
+
+
+def with_dark_patch(x_mm: float) -> str:
+    """Rig file with a dark patch 8 mm wide beside the sample, which reaches to 25 mm."""
+    patch = f"{{x_mm: {x_mm}, y_mm: 0.0, width_mm: 8.0, height_mm: 8.0, reflectance: 0.001, "
+    return changed(
+        RIG, "  bit_depth: 12", f"  dark_patch: {patch}u_reflectance: 0.0}}\n  bit_depth: 12"
+    )
+
+
+def test_a_dark_patch_must_lie_in_the_picture_and_beside_the_sample() -> None:
+    """The picture is 72 mm wide."""
+    load(rig=with_dark_patch(30.0))
+    (outside,) = problems(rig=with_dark_patch(-33.0))
+    assert outside.startswith("rig.yaml:26:15: camera.dark_patch: from -37 to -29 mm leaves the")
+    assert "allowed: -36.1 to 35.9 mm" in outside
+    (twice,) = problems(rig=with_dark_patch(30.0) + "uncertainty: {stray_light: 0.01}\n")
+    assert "stray_light 0.01, u_stray_light 0; allowed with a dark_patch of the camera" in twice
+    (covered,) = problems(rig=with_dark_patch(28.0))
+    assert covered.startswith("protocol.yaml:3:32: sample.width_mm: 50 mm; allowed: at most 48 mm")
+    assert "dark patch is covered (rig.yaml:26)" in covered

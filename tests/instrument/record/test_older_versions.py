@@ -18,7 +18,7 @@ def contents(record: Record) -> list[object]:
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("version", [3, 4])
+@pytest.mark.parametrize("version", [3, 4, 5])
 def test_an_older_record_holds_what_it_held_and_takes_more(tmp_path: Path, version: int) -> None:
     with small_record(tmp_path / "run") as record:
         before = contents(record)

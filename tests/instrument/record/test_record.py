@@ -40,7 +40,7 @@ def test_another_tool_reads_it_while_the_scan_runs(tmp_path: Path) -> None:
         assert other.execute("SELECT theta_r_deg FROM reading").fetchall() == [(-20.0,)]
         assert other.execute("PRAGMA journal_mode").fetchone() == ("wal",)
         other.close()
-        assert record.meta("schema_version") == "5"
+        assert record.meta("schema_version") == "6"
 
 
 def test_a_value_that_could_not_be_measured_stays_unknown(tmp_path: Path) -> None:
@@ -71,7 +71,7 @@ def test_no_record_a_foreign_file_and_another_version_are_named(tmp_path: Path) 
         Record.open(tmp_path)
     with Record.create(tmp_path / "run", {}) as record:
         record.set_meta("schema_version", "99")
-    with pytest.raises(InputError, match="schema version 99; this program reads 3, 4, 5"):
+    with pytest.raises(InputError, match="schema version 99; this program reads 3, 4, 5, 6"):
         Record.open(tmp_path / "run")
 
 

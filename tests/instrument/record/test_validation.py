@@ -16,7 +16,7 @@ from tests.support.strangers.mutations import Mutator, feed
 from tests.support.strangers.run_folders import REFUSED, Sent, copy_of
 
 
-@pytest.fixture(params=[5, 4, 3])
+@pytest.fixture(params=[6, 5, 4, 3])
 def sent(tmp_path: Path, request: pytest.FixtureRequest) -> Sent:
     """A received small record, in each schema version."""
     small_record(tmp_path / "run").close()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from instrument.record.older_versions import OLDER_SQL
 from instrument.record.record import FILE_NAME
-from instrument.record.schema import TABLES
+from instrument.record.schema import SCHEMA_VERSION, TABLES, has_seals, tables_of
 from instrument.record.seal import sealed
 
 
@@ -19,12 +19,30 @@ def as_version(run: Path, version: int) -> None:
     with closing(sqlite3.connect(new, isolation_level=None)) as database:
         database.executescript(OLDER_SQL[version])
         database.execute("ATTACH ? AS new", (str(old),))
-        for table, columns in TABLES.items():
+        for table, columns in tables_of(version).items():
             names = ", ".join(column.name for column in columns)
-            database.execute(f"INSERT INTO main.{table} SELECT {names} FROM new.{table}")
-        database.execute("UPDATE meta SET value = ? WHERE key = 'schema_version'", (str(version),))
+            if has_seals(version):
+                _copy_sealed(database, table, names, version)
+            else:
+                database.execute(f"INSERT INTO main.{table} SELECT {names} FROM new.{table}")
+        _name_version(database, version)
     for name in ("new.sqlite", "new.sqlite-wal", "new.sqlite-shm"):
         (run / name).unlink(missing_ok=True)
+
+
+def _copy_sealed(database: sqlite3.Connection, table: str, names: str, version: int) -> None:
+    rows = [
+        sealed(table, row, version) for row in database.execute(f"SELECT {names} FROM new.{table}")
+    ]
+    for row in rows:
+        database.execute(f"INSERT INTO main.{table} VALUES ({', '.join('?' * len(row))})", row)
+
+
+def _name_version(database: sqlite3.Connection, version: int) -> None:
+    row = ("schema_version", str(version))
+    values = sealed("meta", row, version) if has_seals(version) else row
+    marks = ", ".join("?" * len(values))
+    database.execute(f"INSERT OR REPLACE INTO main.meta VALUES ({marks})", values)
 
 
 def seal_again(database: sqlite3.Connection) -> None:
@@ -38,9 +56,13 @@ def seal_again(database: sqlite3.Connection) -> None:
 
 
 def _seal_table(database: sqlite3.Connection, table: str) -> None:
-    names = ", ".join(column.name for column in TABLES[table])
+    present = {row[1] for row in database.execute(f"PRAGMA table_info({table})")}
+    version = next(
+        v for v in (SCHEMA_VERSION, 5) if {c.name for c in tables_of(v)[table]} <= present
+    )
+    names = ", ".join(column.name for column in tables_of(version)[table])
     database.text_factory = bytes  # a forged text may be no UTF-8
     rows = database.execute(f"SELECT rowid, {names} FROM {table} NOT INDEXED").fetchall()
     database.text_factory = str
-    seals = [(sealed(table, values)[-1], rowid) for rowid, *values in rows]
+    seals = [(sealed(table, values, version)[-1], rowid) for rowid, *values in rows]
     database.executemany(f"UPDATE {table} SET crc32 = ? WHERE rowid = ?", seals)

@@ -31,7 +31,7 @@ def results(run: Path) -> tuple[list[list[str]], object]:
 
 
 @pytest.mark.parametrize(
-    ("command", "version"), [(("report",), 3), (("resume", "--yes"), 3), (("resume", "--yes"), 4)]
+    ("command", "version"), [(("report",), 3), (("resume", "--yes"), 3), (("resume", "--yes"), 5)]
 )
 def test_a_run_of_an_older_version_gives_the_same_results(
     run: Path, tmp_path: Path, command: tuple[str, ...], version: int
@@ -49,5 +49,5 @@ def test_a_run_of_an_older_version_gives_the_same_results(
     assert results(old) == results(run)
     with Record.open(old) as record, Record.open(run) as whole:
         assert record.meta("schema_version") == str(version)
-        assert whole.meta("schema_version") == "5"
+        assert whole.meta("schema_version") == "6"
         assert len(record.readings()) == len(whole.readings()) > 7

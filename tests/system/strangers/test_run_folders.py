@@ -33,7 +33,7 @@ WAYS: dict[str, Callable[[Path], object]] = {
 }
 
 
-@pytest.mark.parametrize("version", [5, 4, 3])
+@pytest.mark.parametrize("version", [6, 5, 4, 3])
 @pytest.mark.parametrize("what", REFUSED)
 def test_every_command_refuses_a_record_that_no_scan_wrote(
     run: Path, tmp_path: Path, what: str, version: int
