@@ -19,6 +19,12 @@ PlanOnly = Annotated[
     bool, typer.Option("--plan", help="Show what would be measured; opens no device.")
 ]
 
+Columns = Annotated[int, typer.Option(help="Squares of the board side by side.")]
+Rows = Annotated[int, typer.Option(help="Squares of the board one below the other.")]
+SquareMm = Annotated[
+    float, typer.Option(help="Side of a square, as measured on the print by a ruler.")
+]
+
 calibrate = typer.Typer(
     cls=Commands,
     no_args_is_help=True,
@@ -82,3 +88,60 @@ def lamp(
         "theta_i_deg": theta_i_deg, "theta_r_deg": theta_r_deg,
     }  # fmt: skip
     calibrate_lamp(rig, out, options, plan_only=plan, as_json=json)
+
+
+@calibrate.command()
+def board(
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="File for the page, new, .pdf.")
+    ] = None,
+    columns: Columns = 6,
+    rows: Rows = 6,
+    square_mm: Annotated[float, typer.Option(help="Side of a square.")] = 8.0,
+) -> None:
+    """Draw the board for `gonio calibrate geometry`, at its true size on a page of A4.
+
+    Squares and markers (ChArUco, DICT_4X4_50 of OpenCV), a ruler to check the print, and what to
+    do. The board of 50 mm fits where a sample of that size does.
+    """
+    from acquisition.commands.calibrate import draw_board
+    from instrument.board import Board
+
+    draw_board(out, Board(columns=columns, rows=rows, square_mm=square_mm))
+
+
+@calibrate.command()
+def geometry(
+    rig: RigOnly = None,
+    out: CalibrationFile = None,
+    plan: PlanOnly = False,
+    columns: Columns = 6,
+    rows: Rows = 6,
+    square_mm: SquareMm = 8.0,
+    u_square_mm: Annotated[float, typer.Option(help="Its standard uncertainty.")] = 0.02,
+    poses: Annotated[int, typer.Option(help="Number of view angles.")] = 13,
+    widest_deg: Annotated[
+        float, typer.Option(help="The largest view angle, to both sides.")
+    ] = 60.0,
+    frames: Annotated[int, typer.Option(help="Frames at each view angle.")] = 4,
+    theta_i_deg: Annotated[float, typer.Option(help="Where the lamp stands.")] = 30.0,
+    dphi_deg: Annotated[float, typer.Option(help="Its azimuth from the camera's plane.")] = 0.0,
+    yes: Annotated[bool, typer.Option("--yes", help="Move a real rig without asking.")] = False,
+    json: Json = False,
+) -> None:
+    """Calibrate the geometry: scale, axis in the picture, roll, zero of theta_r, leans, height.
+
+    The camera looks at the board of `gonio calibrate board` from many angles, then once more after
+    the operator has turned it by half a turn: so the zero of theta_r is told from a lean of the
+    board. Homes and moves the axes, within their limits and clear of keep-out zones. Exits with 5
+    if the board is not found, is another one, or is saturated.
+    """
+    from acquisition.commands.calibrate import calibrate_geometry
+    from instrument.board import Board
+
+    options = {
+        "board": Board(columns=columns, rows=rows, square_mm=square_mm),
+        "u_square_mm": u_square_mm, "poses": poses, "widest_deg": widest_deg, "frames": frames,
+        "theta_i_deg": theta_i_deg, "dphi_deg": dphi_deg,
+    }  # fmt: skip
+    calibrate_geometry(rig, out, options, plan_only=plan, yes=yes, as_json=json)

@@ -17,6 +17,7 @@ from acquisition.engine.axis import Axis
 from acquisition.engine.engine import Devices
 from acquisition.terminal.orderly_end import orderly_end
 from drivers.manual import HandCoveredLamp, HandSetAxis
+from instrument.board import Board
 from instrument.clock import Clock, SystemClock
 from instrument.closeable import Closeable
 from instrument.config.axes import AXES, HandAxis, SimulatedAxis, Wired
@@ -52,33 +53,36 @@ def check_ready(loaded: Loaded) -> None:
 
         require_terminal(str(loaded.protocol_path))
     restart_for_emulated_camera(loaded.rig)
-    if loaded.rig.camera.measured is not None:
+    if loaded.rig.camera.measured is not None or loaded.rig.measured is not None:
         with orderly_end(), OpenRig(loaded.rig, faults=Faults()) as rig:
             require_own_calibration(loaded.rig, loaded.rig_path, rig.camera())
 
 
 def require_own_calibration(rig: Rig, path: Path, camera: Camera) -> None:
-    """Raise `InputError` if the calibration that a rig file names is that of another camera."""
-    measured = rig.camera.measured
+    """Raise `InputError` if a calibration that a rig file names is that of another camera."""
+    measured, geometry = rig.camera.measured, rig.measured
     if measured is not None:
         name = f"{path}: camera: calibration: {rig.camera.calibration}"
         measured.require_camera(name, camera.identity(), camera.settings())
+    if geometry is not None:
+        geometry.require_camera(f"{path}: geometry: {rig.geometry}", camera.identity())
 
 
 def require_dated(loaded: Loaded) -> None:
-    """Raise `InputError` if the calibration of the camera is outdated; call it before a new scan.
+    """Raise `InputError` if a calibration of the rig is outdated; call it before a new scan.
 
-    A resumed scan goes on with the calibration that it began with.
+    A resumed scan goes on with the calibrations that it began with.
     """
     require_calibration_date(loaded.rig, loaded.rig_path)
 
 
 def require_calibration_date(rig: Rig, path: Path) -> None:
-    """Raise `InputError` if the calibration that a rig file names is outdated."""
-    measured = rig.camera.measured
+    """Raise `InputError` if a calibration that a rig file names is outdated."""
+    measured, geometry, now = rig.camera.measured, rig.measured, datetime.now(UTC)
     if measured is not None:
-        name = f"{path}: camera: calibration: {rig.camera.calibration}"
-        measured.require_date(name, datetime.now(UTC))
+        measured.require_date(f"{path}: camera: calibration: {rig.camera.calibration}", now)
+    if geometry is not None:
+        geometry.require_date(f"{path}: geometry: {rig.geometry}", now)
 
 
 def restart_for_emulated_camera(rig: Rig) -> None:
@@ -110,14 +114,15 @@ def _scene(loaded: Loaded) -> Scene:
             f"{loaded.protocol_path}: simulated_sample: missing, but the rig {loaded.rig_path} is "
             "simulated: describe the sample"
         )
-    return Scene.of(loaded.rig, loaded.protocol)
+    return Scene.of(loaded.rig.typed, loaded.protocol)
 
 
 class OpenRig(Closeable):
     """Devices of a rig, each opened on request and closed at the end of a `with` block.
 
     `scene` is what a simulated or emulated rig shows; without one, a white sample, a square with
-    sides of `white_mm`.
+    sides of `white_mm`. `board`: that which its operator may lay there. What is simulated is as the
+    rig file's own numbers say; a calibration of the geometry only tells how it is used.
     """
 
     def __init__(
@@ -126,13 +131,15 @@ class OpenRig(Closeable):
         scene: Scene | None = None,
         faults: Faults | None = None,
         white_mm: float = 50.0,
+        board: Board | None = None,
     ) -> None:
         self._rig, self._closing = rig, ExitStack()
         self._faults = (faults or Faults.from_environment()) if rig.simulated else None
-        self._scene = None if rig.real else scene or Scene.of_white_sample(rig, white_mm)
+        self._scene = None if rig.real else scene or Scene.of_white_sample(rig.typed, white_mm)
         self.clock: Clock = SimulatedClock() if rig.simulated else SystemClock()
         if self._scene is not None:
             self._scene.use_clock(self.clock)
+            self._scene.board = board or self._scene.board
         if self._faults is not None:
             self._faults.scene = self._scene
         self.operator = self._operator()
@@ -178,7 +185,7 @@ class OpenRig(Closeable):
                 self._scene.set_axis(name, angle_deg)
 
     def _stage(self, name: str) -> Stage:
-        settings = self._rig.axes[name]
+        settings = self._rig.typed.axes[name]
         if isinstance(settings, HandAxis):
             return HandSetAxis(name, _AXIS_TEXT[name], self.operator, settings.tolerance_deg)
         if isinstance(settings, SimulatedAxis):

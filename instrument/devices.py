@@ -20,6 +20,8 @@ Controllers answer within 10 to 50 ms. A stop waits no longer than this, and a l
 for again before the status of a moving stage is too old.
 """
 Surface = Literal["sample", "white tile"]
+BoardPlace = Literal["board", "turned board"]
+"""Places of the calibration board, where else the sample is: the second after half a turn."""
 CHANGING_SETTINGS = frozenset({"exposure", "frame period", "frame numbers"})
 """Settings of a camera that differ during a scan, or are measured anew when it is opened."""
 
@@ -47,7 +49,7 @@ class Request:
     text: str
     axis: str = ""
     angle_deg: float = 0.0
-    surface: Surface = "sample"
+    surface: Surface | BoardPlace = "sample"
 
 
 class Operator(Protocol):

@@ -1,4 +1,4 @@
-"""Commands `gonio calibrate ...`: measure a device and write its calibration. Nothing moves."""
+"""Commands `gonio calibrate ...`: measure devices and write what was found. Only theta_r moves."""
 
 from __future__ import annotations
 
@@ -9,6 +9,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from acquisition.calibration.geometry.board_page import board_pdf
+from acquisition.calibration.geometry.plan import GeometryPlan
+from acquisition.calibration.geometry.procedure import GeometryCalibrator
+from acquisition.calibration.geometry.result import geometry_of
+from acquisition.calibration.geometry.summary import geometry_json, geometry_lines
 from acquisition.calibration.lamp.plan import LampPlan
 from acquisition.calibration.lamp.result import lamp_calibration_of
 from acquisition.calibration.lamp.summary import lamp_json, lamp_lines
@@ -17,7 +22,8 @@ from acquisition.calibration.plan import CalibrationPlan
 from acquisition.calibration.procedure import CameraCalibrator
 from acquisition.calibration.result import calibration_of
 from acquisition.calibration.summary import summary_json, summary_lines
-from acquisition.commands.setup import require_rig
+from acquisition.commands.setup import confirm, require_rig, stopped_at_an_error
+from acquisition.engine.positioner import Positioner
 from acquisition.rig import (
     OpenRig,
     require_calibration_date,
@@ -27,12 +33,16 @@ from acquisition.rig import (
 from acquisition.terminal.console import console, out, print_lines, print_notes
 from acquisition.terminal.operator import require_terminal
 from acquisition.terminal.orderly_end import orderly_end
+from instrument.board import Board
 from instrument.calibration.archive import SUFFIX
 from instrument.calibration.camera_calibration import CameraCalibration
 from instrument.calibration.camera_file import write_camera_file
+from instrument.calibration.geometry_file import GeometryCalibration, write_geometry_file
 from instrument.calibration.lamp_file import LampCalibration, write_lamp_file
+from instrument.config.axes import AXES
 from instrument.config.rig import Rig
 from instrument.errors import InputError
+from instrument.text.atomic_file import write_whole
 
 _WHITE_FILLS = 3.0  # widths of the picture: size of the white surface in a scene
 
@@ -107,7 +117,9 @@ def _print(calibration: CameraCalibration, rig: Rig, path: Path, as_json: bool) 
     _print_end(calibration, path)
 
 
-def _print_end(calibration: CameraCalibration | LampCalibration, path: Path) -> None:
+def _print_end(
+    calibration: CameraCalibration | LampCalibration | GeometryCalibration, path: Path
+) -> None:
     print_notes(calibration.notes)
     print_lines([f"file: {path} (sha256 {calibration.sha256[:16]}...)"])
 
@@ -151,3 +163,66 @@ def _watched(plan: LampPlan, rig_path: Path) -> LampCalibration:
             say=_say,
         )  # fmt: skip
         return lamp_calibration_of(watcher.measure(), plan, lamp, camera, datetime.now(UTC))
+
+
+def draw_board(path: Path | None, board: Board) -> None:
+    """Write the PDF of a board to `path`, which must be new."""
+    if path is None or path.suffix != ".pdf":
+        raise InputError("gonio calibrate board: name the file to write: -o FILE.pdf")
+    write_whole(path, board_pdf(board), new=True)
+    width, height = board.size_mm
+    print_lines(
+        [
+            f"{path}: {board}, {width:g} x {height:g} mm with its margin",
+            "print it at 100 %, and check the ruler on it; the page says the rest",
+        ]
+    )
+
+
+def calibrate_geometry(
+    rig_path: Path | None,
+    path: Path | None,
+    options: Mapping[str, Any],
+    *,
+    plan_only: bool,
+    yes: bool,
+    as_json: bool,
+) -> None:
+    """Calibrate the geometry of a rig and write the file `path`; `plan_only`: only say how.
+
+    `options` of `GeometryPlan`, by their names. `yes`: the rig may move, without asking.
+    """
+    rig = require_rig(rig_path)
+    plan = GeometryPlan(rig=rig, **options)
+    if plan_only:
+        print_lines(plan.lines())
+        return
+    path = _require_path(path, "geometry")
+    _require_somebody(rig, rig_path)
+    with orderly_end():
+        written = write_geometry_file(path, _seen(plan, yes))
+    if as_json:
+        sys.stdout.write(json.dumps(geometry_json(written, str(path))) + "\n")
+        return
+    print_lines(geometry_lines(written, rig, path, out.width))
+    _print_end(written, path)
+
+
+def _seen(plan: GeometryPlan, yes: bool) -> GeometryCalibration:
+    rig = plan.rig
+    with OpenRig(rig, board=plan.board) as open_rig:
+        axes = {name: open_rig.axis(name) for name in AXES}
+        camera = open_rig.camera()
+        identity, stage = camera.identity(), axes["theta_r"].identity()
+        what = "\n".join(plan.lines())
+        confirm(rig, yes, f"{what}\nAll axes are homed first, and move through these poses.")
+        positioner = Positioner(rig, axes, open_rig.lamp, open_rig.operator, _say)
+        calibrator = GeometryCalibrator(
+            plan=plan, camera=camera, lamp=open_rig.lamp, positioner=positioner,
+            operator=open_rig.operator, say=_say,
+        )  # fmt: skip
+        with stopped_at_an_error(*axes.values()):
+            positioner.home()
+            corners = calibrator.measure()
+        skipped, now = calibrator.skipped, datetime.now(UTC)
+        return geometry_of(corners, plan, camera=identity, stage=stage, skipped=skipped, now=now)

@@ -28,8 +28,8 @@ def home_axis(axis: str, rig_path: Path | None, yes: bool) -> None:
     _motor(axis, rig)
     with orderly_end(), OpenRig(rig) as open_rig:
         stage = open_rig.axis(axis)
-        _confirm(rig, yes, f"{stage.identity()}\n{axis}{_at(stage)} will look for its reference.")
-        with _stopped_at_an_error(stage):
+        confirm(rig, yes, f"{stage.identity()}\n{axis}{_at(stage)} will look for its reference.")
+        with stopped_at_an_error(stage):
             stage.home()
         _print_position(axis, stage.position_deg())
 
@@ -51,8 +51,8 @@ def move_axis(axis: str, angle_deg: float, rig_path: Path | None, yes: bool) -> 
         question = f"{stage.identity()}\n{axis} will move from {here_deg:.4f} to {angle_deg:g} deg."
         if rig.keep_out:
             question += " The other axes are not read: keep-out zones are NOT checked."
-        _confirm(rig, yes, question)
-        with _stopped_at_an_error(stage):
+        confirm(rig, yes, question)
+        with stopped_at_an_error(stage):
             for move in axis_moves(axis, here_deg, angle_deg, rig):
                 stage.start_move(move.angle_deg)
                 stage.finish_move()
@@ -68,14 +68,14 @@ def _at(axis: Axis) -> str:
 
 
 @contextmanager
-def _stopped_at_an_error(axis: Axis) -> Iterator[None]:
-    """Stop an axis at a signal, at once, and at any error of a `with` block in which it moves."""
-    with stopped_by_signals({axis.name: axis.stop}):
+def stopped_at_an_error(*axes: Axis) -> Iterator[None]:
+    """Stop axes at a signal, at once, and at any error of a `with` block in which they move."""
+    with stopped_by_signals({axis.name: axis.stop for axis in axes}):
         try:
             with orderly_end():
                 yield
         except BaseException as error:
-            trouble = _trouble_of_stop(axis)
+            trouble = "".join(map(_trouble_of_stop, axes))
             if isinstance(error, KeyboardInterrupt):
                 why = str(error) or "stopped by the operator"
                 raise OperatorStop(f"{why}{trouble or _ENDED}") from None
@@ -161,7 +161,7 @@ def require_rig(path: Path | None, *, calibrated: bool = False) -> Rig:
     return load_rig(path, calibrated=calibrated)
 
 
-def _confirm(rig: Rig, yes: bool, question: str) -> None:
+def confirm(rig: Rig, yes: bool, question: str) -> None:
     """Say what will move on a real rig, and ask, unless `yes`."""
     if rig.real and yes:
         console.print(question, highlight=False, soft_wrap=True)

@@ -1,7 +1,8 @@
 """Folder of a run: its name, its copies of its input files, and the data that identify the run.
 
 They are the protocol, the rig, the table of the white tile if the protocol names one, and the
-calibration of the camera, without pixel maps, if the rig names one. The record keeps the texts and
+calibrations of camera and geometry, without maps and tables, if the rig names them. The record
+keeps the texts and
 their SHA-256. The copies are for people and for `load_run_inputs`, which refuses a copy that was
 edited: readings before and after the edit would not belong together.
 """
@@ -24,12 +25,14 @@ from instrument.text.atomic_file import write_whole
 
 PROTOCOL_FILE, RIG_FILE, TILE_FILE = "protocol.yaml", "rig.yaml", "white_tile.csv"
 CALIBRATION_FILE = "camera_calibration.json"
-# By the record's key of the text; the last two only where protocol and rig name them.
+GEOMETRY_FILE = "geometry_calibration.json"
+# By the record's key of the text; the last three only where protocol and rig name them.
 _FILES = {
     "protocol": PROTOCOL_FILE,
     "rig": RIG_FILE,
     "white_tile": TILE_FILE,
     "camera_calibration": CALIBRATION_FILE,
+    "geometry_calibration": GEOMETRY_FILE,
 }
 
 
@@ -57,6 +60,7 @@ def run_meta(loaded: Loaded, plan: Plan) -> dict[str, str]:
         "steps": str(len(plan.steps)),
         **_text_meta("white_tile", loaded.tile_text),
         **_text_meta("camera_calibration", loaded.calibration_text),
+        **_text_meta("geometry_calibration", loaded.geometry_text),
         **loaded.protocol.metadata.given(),
     }
 
@@ -90,12 +94,14 @@ def load_run_inputs(record: Record) -> Loaded:
         check_model=check_model,
         tile_path=folder / TILE_FILE,
         calibration_path=folder / CALIBRATION_FILE,
+        geometry_path=folder / GEOMETRY_FILE,
     )
     texts = {
         "protocol": loaded.protocol_text,
         "rig": loaded.rig_text,
         "white_tile": loaded.tile_text,
         "camera_calibration": loaded.calibration_text,
+        "geometry_calibration": loaded.geometry_text,
     }
     for key, name in _FILES.items():
         text = texts[key]

@@ -6,16 +6,19 @@ Counts of a pixel are made linear by `linear_counts_dn`; the maps are for those 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 
 from instrument.calibration.quantity import Quantity
 from instrument.calibration.response_curve import ResponseCurve
+from instrument.calibration.same_device import (
+    LONGEST_AGE_DAYS,
+    require_recent,
+    require_same_camera,
+)
 from instrument.errors import InputError
 from instrument.geometry import FloatArray
 from instrument.text.quoting import shown
 
-LONGEST_AGE_DAYS = 365.0
-"""Age above which a calibration is outdated: a year, the usual interval of laboratories."""
 MAPS = (
     "dark_offset_dn", "u_dark_offset_dn", "dark_current_dn_per_s", "u_dark_current_dn_per_s",
     "hot", "response", "u_response", "measured", "deviant",
@@ -65,11 +68,7 @@ class CameraCalibration:
 
         A setting counts where both state it: exposure and the like are in neither.
         """
-        if camera != self.camera:
-            raise InputError(
-                f"{name}: is the calibration of {self.camera!r}, but the camera is "
-                f"{camera!r}: calibrate this one (gonio calibrate camera)"
-            )
+        require_same_camera(name, "camera", self.camera, camera)
         for key, own in self.settings.items():
             if settings.get(key, own) != own:
                 raise InputError(
@@ -81,11 +80,4 @@ class CameraCalibration:
         self, name: str, now: datetime, longest_days: float = LONGEST_AGE_DAYS
     ) -> None:
         """Raise `InputError` if the calibration in the file `name` is too old, or of the future."""
-        made = datetime.fromisoformat(self.date_utc)
-        if now - made > timedelta(days=longest_days):
-            age = f"{(now - made).days} days old; allowed: {longest_days:g}"
-            raise InputError(f"{name}: is {age}. Calibrate again")
-        if made - now > timedelta(days=1):
-            raise InputError(
-                f"{name}: is dated {self.date_utc}, in the future: check the computer's clock"
-            )
+        require_recent(name, self.date_utc, now, longest_days)

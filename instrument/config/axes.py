@@ -8,7 +8,7 @@ matters only here, in `acquisition.rig`, and in the two modules that handle ever
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field
 
@@ -47,6 +47,13 @@ class _Axis(Section):
         """Require min_deg < max_deg."""
         if self.min_deg >= self.max_deg:
             yield "min_deg", f"{self.min_deg:g}; allowed: less than max_deg {self.max_deg:g}"
+
+    def with_zero(self, zero_deg: float) -> Self:
+        """Return the same axis whose device reads `zero_deg` at 0; no limit moves in the device."""
+        by_deg = (self.zero_deg - zero_deg) * self.sign
+        moved = ("min_deg", "max_deg", "home_deg")
+        own = {key: getattr(self, key) + by_deg for key in moved if hasattr(self, key)}
+        return self.model_copy(update={"zero_deg": zero_deg, **own})
 
     @property
     def tolerance_deg(self) -> float:

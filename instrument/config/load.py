@@ -7,6 +7,7 @@ valid by themselves are checked against each other even if others are not.
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
@@ -14,6 +15,13 @@ from typing import TypeVar
 from pydantic import ValidationError
 
 from instrument.calibration.camera_file import header_text, read_camera_file, read_camera_header
+from instrument.calibration.geometry_file import (
+    CAMERA_KEYS,
+    GeometryCalibration,
+    geometry_text,
+    read_geometry_file,
+    read_geometry_text,
+)
 from instrument.calibration.tile_file import read_tile_table
 from instrument.config.file_role import wrong_role
 from instrument.config.protocol import Protocol
@@ -27,6 +35,8 @@ from instrument.errors import InputError
 from instrument.text.quoting import printable
 
 MAX_REPORTED = 200  # mistakes per file; more would scroll the first ones off the screen
+
+_MOST_ZERO_DEG = 5.0  # of a calibrated zero from the one typed by hand
 
 AnySection = TypeVar("AnySection", bound=Section)
 
@@ -54,6 +64,12 @@ class Loaded:
         measured = self.rig.camera.measured
         return None if measured is None else header_text(measured)
 
+    @property
+    def geometry_text(self) -> str | None:
+        """Text of the geometry's calibration without its corners; None without a calibration."""
+        measured = self.rig.measured
+        return None if measured is None else geometry_text(measured)
+
 
 def load_rig(path: Path, *, calibrated: bool = False) -> Rig:
     """Read a rig file. Raises `InputError` with every mistake in it.
@@ -61,7 +77,7 @@ def load_rig(path: Path, *, calibrated: bool = False) -> Rig:
     The calibration of its camera is read only if asked for: most commands have no use for it.
     """
     file = _read(path, Rig)
-    rig = file.check(Rig)
+    rig = _checked_rig(file, None)
     if rig is not None and calibrated:
         rig = _with_calibration(file, rig, None)
     if rig is None or file.found:
@@ -76,11 +92,12 @@ def load_protocol(
     check_model: ModelCheck | None = None,
     tile_path: Path | None = None,
     calibration_path: Path | None = None,
+    geometry_path: Path | None = None,
 ) -> Loaded:
-    """Read a protocol, its rig, the table of its white tile, and the calibration of its camera.
+    """Read a protocol, its rig, the table of its white tile, and the calibrations of its rig.
 
     `rig_path` replaces the rig that the protocol names, `tile_path` the table of the tile, and
-    `calibration_path`, a run's copy, the calibration.
+    `calibration_path` and `geometry_path`, a run's copies, the calibrations of camera and geometry.
 
     `check_model(name, parameters)` returns what is wrong with a model of the protocol, or None;
     parameters are None if the protocol only names the model. Raises `InputError` with every mistake
@@ -91,7 +108,7 @@ def load_protocol(
     for at, text in own_mistakes(file.marked, check_model):
         file.add(at, text)
     rig_file = _rig_file(file, rig_path)
-    rig = None if rig_file is None else rig_file.check(Rig)
+    rig = None if rig_file is None else _checked_rig(rig_file, geometry_path)
     if rig_file is not None and file.marked.readable and rig_file.marked.readable:
         for at, text in rig_mistakes(file.marked, rig_file.marked, rig_file.name):
             file.add(at, text)
@@ -164,6 +181,49 @@ def _with_tile_table(file: _File, protocol: Protocol, path: Path | None) -> Prot
         return protocol
     references = protocol.references.model_copy(update={"white_tile": whole})
     return protocol.model_copy(update={"references": references})
+
+
+def _checked_rig(file: _File, copy: Path | None) -> Rig | None:
+    """Return the rig with the geometry that its file names; None, with mistakes added, if invalid.
+
+    Of the camera's values that a geometry gives, those that the file leaves out are filled in.
+    """
+    named, measured = file.marked.get(("geometry",)), None
+    if isinstance(named, str) and named and ("geometry",) not in file.marked.refused:
+        try:
+            path = file.path.parent / named
+            measured = read_geometry_file(path) if copy is None else read_geometry_text(copy)
+        except InputError as error:
+            file.add(("geometry",), error.problems[0])
+            return None
+        camera = file.marked.data.get("camera")
+        if isinstance(camera, dict):
+            for key in CAMERA_KEYS:
+                camera.setdefault(key, getattr(measured, key))
+    rig = file.check(Rig)
+    if rig is None or measured is None:
+        return rig
+    for text in _contradictions(rig, measured):
+        file.add(("geometry",), f"{named}: {text}")
+    return rig.with_geometry(replace(measured, arrays={}))  # a scan has no use for the corners
+
+
+def _contradictions(rig: Rig, measured: GeometryCalibration) -> Iterator[str]:
+    """Yield why a calibration of the geometry cannot be that of a rig."""
+    camera, axis = rig.camera, rig.axes.theta_r
+    if measured.size_px != (camera.width_px, camera.height_px):
+        width, height = measured.size_px
+        yield (
+            f"of a camera with {width} x {height} pixels; allowed: {camera.width_px} x "
+            f"{camera.height_px}"
+        )
+    if measured.sign != axis.sign:
+        yield f"of theta_r with sign {measured.sign}; allowed: {axis.sign}. Calibrate again"
+    elif abs(measured.zero_deg - axis.zero_deg) > _MOST_ZERO_DEG:
+        yield (
+            f"theta_r reads {measured.zero_deg:.6g} at 0; allowed: up to {_MOST_ZERO_DEG:g} deg "
+            f"from its zero_deg, {axis.zero_deg:g}. Was the stage mounted anew? Calibrate again"
+        )
 
 
 def _with_calibration(file: _File, rig: Rig, copy: Path | None) -> Rig:

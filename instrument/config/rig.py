@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
+from instrument.calibration.geometry_file import GeometryCalibration
 from instrument.config.axes import AXES, EMULATED, Axes, HandAxis, SimulatedAxis, Wired
 from instrument.config.camera import AnyCamera, CameraDefects, SimulatedCameraConfig
 from instrument.config.section import Finite, Name, NotNegative, Positive, Section
@@ -128,7 +129,11 @@ class Simulation(Section):
 
 
 class Rig(Section):
-    """Complete rig file."""
+    """Complete rig file.
+
+    `geometry`: file of `gonio calibrate geometry`, beside the rig file. It gives the camera's
+    `field_width_mm`, `axis_row_px`, `axis_column_px` and `roll_deg`, and `zero_deg` of theta_r.
+    """
 
     name: Name
     description: str = ""
@@ -145,6 +150,30 @@ class Rig(Section):
     lamp: LampConfig
     uncertainty: RigLines = RigLines()
     simulation: Simulation = Simulation()
+    geometry: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
+    _measured: GeometryCalibration | None = PrivateAttr(None)
+    _typed: Rig | None = PrivateAttr(None)
+
+    @property
+    def measured(self) -> GeometryCalibration | None:
+        """Content of the file `geometry`; None without one."""
+        return self._measured
+
+    @property
+    def typed(self) -> Rig:
+        """Rig as its file states it, without the calibration of its geometry."""
+        return self._typed or self
+
+    def with_geometry(self, measured: GeometryCalibration) -> Self:
+        """Return a copy that takes the values of its `geometry`."""
+        axis = self.axes.theta_r.with_zero(measured.zero_deg)
+        update = {
+            "camera": self.camera.model_copy(update=measured.camera_values()),
+            "axes": self.axes.model_copy(update={"theta_r": axis}),
+        }
+        rig = self.model_copy(update=update)
+        rig._measured, rig._typed = measured, self
+        return rig
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
         """Require all devices to be simulated, all emulated or all real: they share one scene."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from instrument.config.simulated.defects import AxisDefects, BeamDefects
+from instrument.config.simulated.defects import AxisDefects, BeamDefects, Placement
 from instrument.geometry import FloatArray, camera_direction, lamp_direction
 from instrument.pinhole import Pinhole
 
@@ -91,6 +91,14 @@ def placement(shift_x_mm: float, shift_y_mm: float, turn_deg: float) -> FloatArr
     turn = np.radians(turn_deg)
     c, s = float(np.cos(turn)), float(np.sin(turn))
     return np.array([[c, -s, shift_x_mm], [s, c, shift_y_mm], [0.0, 0.0, 1.0]])
+
+
+def half_turned(own: Placement) -> Placement:
+    """Return the place of a surface that was turned by half a turn in its own plane."""
+    opposite = ("tilt_deg", "tilt_across_deg", "shift_x_mm", "shift_y_mm")
+    turn_deg = own.turn_deg - math.copysign(180.0, own.turn_deg)
+    changed = {"turn_deg": turn_deg} | {name: -getattr(own, name) for name in opposite}
+    return own.model_copy(update=changed)
 
 
 def turned(points_mm: FloatArray, turn_deg: float) -> FloatArray:

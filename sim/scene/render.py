@@ -24,7 +24,8 @@ from sim.defects.lamp import beam_profile, wall_radiance
 from sim.defects.lens import bent_by_lens, transmission
 from sim.defects.mechanics import leaning_homography, turned
 from sim.defects.picture import scattered
-from sim.scene.scene import Scene
+from sim.scene.board import print_on
+from sim.scene.scene import BOARD_PLACES, Scene
 
 _NODES = 9  # per side: interpolation error below 4e-5 of the radiance, 5e-6 of an image's mean
 
@@ -111,6 +112,8 @@ def _surface_radiance(scene: Scene, projection: _Projection) -> FloatImage:
     smooth: FloatImage = (matrix_y @ values.astype(np.float32)) @ matrix_x.T
     if scene.mounted == "sample" and scene.sample.mottling > 0:
         smooth *= 1 + _texture(scene, projection)
+    elif scene.mounted in BOARD_PLACES:
+        smooth *= print_on(scene.board, projection.homography, outline)
     return smooth
 
 

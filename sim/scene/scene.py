@@ -11,18 +11,20 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass, field
+from typing import get_args
 
 import cv2
 import numpy as np
 
 from analysis.accuracy.render_brdf import adequate_brdf
 from analysis.models import MODELS
+from instrument.board import Board
 from instrument.clock import Clock
 from instrument.config.camera import DarkPatch
 from instrument.config.protocol import PatchConfig, Protocol, Sample, SimulatedSample, WhiteTile
 from instrument.config.rig import Rig
 from instrument.config.simulated.defects import Placement
-from instrument.devices import Surface
+from instrument.devices import BoardPlace, Surface
 from instrument.geometry import Brdf, FloatArray, IntArray
 from sim.clock import SimulatedClock
 from sim.defects.drawn_bench import drawn_bench
@@ -30,6 +32,7 @@ from sim.defects.lamp import warm_up_level
 from sim.defects.mechanics import (
     SeenAngles,
     axis_error_deg,
+    half_turned,
     leaning,
     leaning_across,
     picture_shift,
@@ -41,6 +44,10 @@ from sim.defects.world import SOUND, World
 
 # Place of an axis before it is first set by hand: no picture counts yet, but a dark may show light.
 _UNSET_DEG = {"theta_i": 30.0, "dphi": 0.0, "theta_r": 0.0}
+
+
+BOARD_PLACES = get_args(BoardPlace)
+PAPER = 0.8  # reflectance of white paper (assumed)
 
 
 def stream_key(name: str) -> int:
@@ -56,8 +63,8 @@ class Scene:
     true_deg: true angle of each axis in degrees; it differs from the commanded one by the axis
     error. clock: by which the lamp drifts. rings: see `sim.scene.render`; cache of the averaging
     needed for each place of the lamp. heights_mm: height of each surface above the rotation axis;
-    that of the tile is drawn from the rig's uncertainty of placement. world: faults that no device
-    reports.
+    that of the tile is drawn from the rig's uncertainty of placement; a board lies as the sample
+    does. world: faults that no device reports. board: that which the operator may put there.
     """
 
     rig: Rig
@@ -65,15 +72,16 @@ class Scene:
     sample_size: Sample
     patch: PatchConfig
     white_tile: WhiteTile | None
-    surface: Surface = "sample"
+    surface: Surface | BoardPlace = "sample"
     lit: bool = True
     step: int = 0
     clock: Clock = field(default_factory=SimulatedClock)
     true_deg: dict[str, float] = field(default_factory=dict)
     rings: dict[tuple[str, float, float], IntArray] = field(default_factory=dict)
     world: World = SOUND
+    board: Board = field(default_factory=Board)
     _texture: FloatArray | None = None
-    heights_mm: dict[Surface, float] = field(init=False)
+    heights_mm: dict[Surface | BoardPlace, float] = field(init=False)
     _lamp_start_s: float = 0.0
 
     def __post_init__(self) -> None:
@@ -82,6 +90,8 @@ class Scene:
         simulation = self.rig.simulation
         self.heights_mm = {
             "sample": simulation.sample_height_mm,
+            "board": simulation.sample_height_mm,
+            "turned board": simulation.sample_height_mm,
             "white tile": float(tile_mm) + simulation.tile_height_mm,
         }
 
@@ -134,7 +144,7 @@ class Scene:
         self.true_deg[axis] = float(angle_deg + error_deg + lasting_deg)
 
     @property
-    def mounted(self) -> Surface | None:
+    def mounted(self) -> Surface | BoardPlace | None:
         """Surface on the table: the one that was asked for, unless the world is at fault."""
         if self.world.mounted == "nothing":
             return None
@@ -144,6 +154,8 @@ class Scene:
     def placement(self) -> Placement:
         """Place of the mounted surface on the table, without the faults of the moment."""
         simulation = self.rig.simulation
+        if self.mounted == "turned board":
+            return half_turned(simulation.sample_placement)
         tile = self.mounted == "white tile"
         return simulation.tile_placement if tile else simulation.sample_placement
 
@@ -192,6 +204,8 @@ class Scene:
                 return adequate_brdf(self.sample.model, self.sample.parameters)
             model, parameters = MODELS[self.sample.model], self.sample.parameters
             return lambda geometry: model.brdf(geometry, **parameters)
+        if self.mounted in BOARD_PLACES:
+            return lambda geometry: MODELS["lambert"].brdf(geometry, albedo=PAPER)
         tile = self.rig.simulation.tile
         if tile is not None:
             return lambda geometry: radiance_factor(geometry, tile) / np.pi
@@ -201,6 +215,8 @@ class Scene:
     @property
     def size_mm(self) -> tuple[float, float]:
         """Width and height of the mounted surface; a tile of unstated size is like the sample."""
+        if self.mounted in BOARD_PLACES:
+            return self.board.size_mm
         tile = self.white_tile if self.mounted == "white tile" else None
         if tile is None or tile.width_mm is None or tile.height_mm is None:
             return self.sample_size.width_mm, self.sample_size.height_mm

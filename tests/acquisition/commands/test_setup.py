@@ -187,7 +187,7 @@ def test_a_signal_while_a_lost_axis_is_stopped_keeps_the_warning(
     words = "^stopped by the operator\nLOOK AT THE RIG FIRST: theta_r .* gone\ntheta_r: no answer"
     with (
         pytest.raises(OperatorStop, match=words),
-        setup._stopped_at_an_error(Lost()),  # type: ignore[arg-type]  # a stand-in
+        setup.stopped_at_an_error(Lost()),  # type: ignore[arg-type]  # a stand-in
     ):
         raise DeviceError("theta_r: no answer")
 

@@ -1,0 +1,1 @@
+"""Geometry of a rig from pictures of a board: projection of its corners, and the fit."""
