@@ -19,6 +19,7 @@ import numpy as np
 
 from acquisition.measure.hot_pixels import without_hot_pixels
 from acquisition.measure.radiometry import Dark, Signal, photon_transfer
+from acquisition.measure.type_a import SEEN_SIGMA, chi_squared_limit
 from acquisition.measure.window import Window
 from instrument.config.rig import Rig
 from instrument.devices import Frame
@@ -26,9 +27,9 @@ from instrument.errors import Interlock
 from instrument.geometry import FloatArray
 
 FLAG = "frames differ"
-# Limits of chi-squared, as deviations of a normal distribution. A scatter is seen in one of 30 000
-# sound readings, whose u it raises; it is surely too large in none of 50 million.
-_SEEN_SIGMA, _SURE_SIGMA = 4.0, 5.5
+# Limit of chi-squared, as a deviation of a normal distribution: a scatter that is surely too large
+# is seen in none of 50 million sound readings. SEEN_SIGMA is the one that raises u.
+_SURE_SIGMA = 5.5
 _LOW_TAIL = 0.05  # probability that so small a scatter is seen by chance
 _RECENT = 8  # readings
 # Variance of a pixel relative to the rig file's: 16 of read noise where the true full well is a
@@ -99,18 +100,6 @@ def _deviations_dn(frames: Sequence[Frame], window: Window) -> FloatArray:
     return deviations
 
 
-def _limit(freedom: int, sigma: float) -> float:
-    """Return the value that chi-squared exceeds as seldom as a normal deviate `sigma`.
-
-    Wilson and Hilferty 1931: the cube root of chi-squared is nearly normal; at one degree of
-    freedom the limit is a fifth too large.
-    """
-    if not freedom:
-        return 0.0
-    part = 2 / (9 * freedom)
-    return float(freedom * (1 - part + sigma * math.sqrt(part)) ** 3)
-
-
 @dataclass(slots=True)
 class FrameScatter:
     """Judge of the readings of one scan; `note` records what was found.
@@ -140,7 +129,7 @@ class FrameScatter:
         if excess > 0:
             signal = replace(signal, u_noise_dn=math.hypot(signal.u_noise_dn, math.sqrt(excess)))
         flags = [signal.flags] * bool(signal.flags)
-        if found.ratio > _limit(found.freedom, _SURE_SIGMA):
+        if found.ratio > chi_squared_limit(found.freedom, _SURE_SIGMA):
             self.note(f"{name}: {FLAG}: {self._text(found, signal)}")
             flags.append(FLAG)
         self._require_steady(signal, name)
@@ -163,8 +152,8 @@ class FrameScatter:
         if not last:
             return 0.0
         freedom = sum(one.freedom for one in last)
-        own = found.noise_ratio > _limit(found.freedom, _SEEN_SIGMA)
-        all_of_them = sum(one.noise_ratio for one in last) > _limit(freedom, _SEEN_SIGMA)
+        own = found.noise_ratio > chi_squared_limit(found.freedom, SEEN_SIGMA)
+        all_of_them = sum(one.noise_ratio for one in last) > chi_squared_limit(freedom, SEEN_SIGMA)
         if not (own or all_of_them):
             return 0.0
         measured = found.squares / found.freedom - found.pixel_variance if own else 0.0
@@ -176,7 +165,9 @@ class FrameScatter:
         """Raise `Interlock` if the last readings scatter too much, the worst left out."""
         last = self._without_worst()
         freedom = sum(one.freedom for one in last)
-        if len(self._recent) < 2 or sum(one.ratio for one in last) <= _limit(freedom, _SURE_SIGMA):
+        if len(self._recent) < 2 or sum(one.ratio for one in last) <= chi_squared_limit(
+            freedom, _SURE_SIGMA
+        ):
             return
         raise Interlock(
             f"{FLAG}, in reading after reading, lastly in {name}: "

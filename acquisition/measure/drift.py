@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.measure.radiometry import FEW_PIXELS, LEAVES_FRAME
+from acquisition.measure.type_a import scatter_ratio
 from instrument.geometry import FloatArray, IntArray
 from instrument.record.reading import Check, Reading
 
@@ -24,20 +25,31 @@ class _Segment:
     """Checks between which the lamp drifts steadily.
 
     times_s, level, u_relative: one entry a check, the level relative to the block's first check.
+    scatter: of the checks about a steady drift, in units of their noise, which `u_relative` has.
     """
 
     times_s: FloatArray
     level: FloatArray
     u_relative: FloatArray
+    scatter: float = 1.0
 
     @classmethod
     def of(cls, checks: Sequence[Reading], first_rate: float) -> _Segment:
-        return cls(
-            np.array([r.time_s for r in checks]),
-            np.array([rate(r) / first_rate for r in checks]),
-            # Same geometry each time: only the noise differs, not placement or rounding.
-            np.array([r.u_noise_dn / r.signal_dn for r in checks]),
-        )
+        times_s = np.array([r.time_s for r in checks])
+        level = np.array([rate(r) / first_rate for r in checks])
+        # Same geometry each time: only the noise differs, not placement or rounding.
+        noise = np.array([r.u_noise_dn / r.signal_dn for r in checks])
+        by_noise = cls(times_s, level, noise)
+        if by_noise.u_between.any():  # a jump has an uncertainty of its own
+            return by_noise
+        scatter = scatter_ratio(times_s, level, noise)
+        return cls(times_s, level, noise * scatter, scatter)
+
+    @property
+    def u_wander(self) -> float:
+        """Standard uncertainty of a level by what the checks scatter beyond noise, relative."""
+        wander = float(np.median(self.u_relative)) * math.sqrt(1 - self.scatter**-2)
+        return wander if self.scatter > 1 else 0.0
 
     @property
     def trend_per_s(self) -> float:
@@ -155,6 +167,16 @@ class Drift:
     def u_relative(self) -> FloatArray:
         """Standard uncertainty due to noise of every check, shape (checks,), relative to it."""
         return np.concatenate([[], *(s.u_relative for s in self.segments)])
+
+    @property
+    def scatter(self) -> float:
+        """Scatter of the checks about a steady drift, in units of their noise; at least 1."""
+        return max((segment.scatter for segment in self.segments), default=1.0)
+
+    def u_wander(self, time_s: float) -> float:
+        """Return the relative standard uncertainty of a level for what checks scatter at random."""
+        segment = self._segment(time_s)
+        return 0.0 if segment is None else segment.u_wander
 
     def at(self, time_s: float) -> float:
         """Return the relative level at a time of the scan."""

@@ -22,6 +22,7 @@ from acquisition.measure.placement import tilt_deg
 from acquisition.measure.scattering import StrayLight, stray_light
 from acquisition.measure.white_tile import Standard, standard
 from acquisition.results.effects.effect import Readings
+from acquisition.results.effects.lamp_level import drift_between, drift_noise, wander
 from acquisition.results.effects.lens import STRAY
 from acquisition.results.effects.rig_effects import has_effects, rig_effects, tiles_of
 from analysis.data.measurements import SharedError
@@ -35,7 +36,7 @@ from instrument.record.reading import Check, Reading
 from instrument.record.record import Record
 
 # Components of uncertainty, and flags of points, as files and reports call them.
-NOISE, ROUNDING, DRIFT = "photon and read noise", "rounding to counts", "lamp drift"
+NOISE, ROUNDING = "photon and read noise", "rounding to counts"
 LINEARITY = "linearity of the camera"
 DARK, PLACEMENT, TEXTURE = "dark frames", "sample placement", "texture at the window edge"
 NO_TILE_YET = "no white tile yet"
@@ -55,7 +56,8 @@ class Reduced:
         with the white tile adds.
     flags: empty for a good point.
     drift_levels: lamp level relative to the first check, at each usable check, one array a block.
-    drift_checks: number of drift checks that were made.
+    drift_checks: number of drift checks that were made. drift_scatter: of their levels about a
+        steady drift, in units of their noise.
     """
 
     points: tuple[Reading, ...]
@@ -67,6 +69,7 @@ class Reduced:
     flags: tuple[str, ...]
     drift_levels: tuple[FloatArray, ...]
     drift_checks: int
+    drift_scatter: float = 1.0
 
     @property
     def parts(self) -> dict[str, FloatArray]:
@@ -219,11 +222,11 @@ def reduce(
         points=points,
         radiance=radiance,
         brdf=radiance / white * known,
-        components=_components(points),
+        components={**_components(points), **wander(points, drifts)},
         shared=(
             *_shared(points, placements),
-            *_drift_noise(points, drifts),
-            *_drift_between(points, drifts),
+            *drift_noise(points, drifts),
+            *drift_between(points, drifts),
         ),
         shared_by_tile=_shared_by_tile(points, own, tile),
         flags=tuple(
@@ -231,6 +234,7 @@ def reduce(
         ),
         drift_levels=tuple(drift.level for drift in drifts.values()),
         drift_checks=sum(r.kind == "drift" for r in readings) + sum(c.jumped for c in checks),
+        drift_scatter=max((drift.scatter for drift in drifts.values()), default=1.0),
     )
 
 
@@ -285,9 +289,10 @@ def _relative(points: Sequence[Reading], name: str) -> FloatArray:
 def _tile(reading: Reading, drift: Drift, placement: int, doubts: Doubts) -> _Tile:
     names = ("u_noise_dn", "u_quantisation_dn", "u_texture_dn", "u_dark_dn", "u_placement_dn")
     *own, u_placement = (float(_relative([reading], name)[0]) for name in names)
+    of_lamp = drift.u_extrapolated(reading.time_s), drift.u_wander(reading.time_s)
     return _Tile(
         rate=rate(reading) / drift.at(reading.time_s),
-        u_own=float(np.linalg.norm([*own, drift.u_extrapolated(reading.time_s)])),
+        u_own=float(np.linalg.norm([*own, *of_lamp])),
         u_placement=u_placement,
         placement=placement,
         flags="; ".join((*_own_flags(reading, doubts), *[NO_SIGNAL] * (reading.signal_dn == 0))),
@@ -318,47 +323,6 @@ def _placements(readings: Sequence[Reading]) -> dict[int, int]:
     changes = [a.surface != b.surface for a, b in zip(readings, before, strict=False)]
     steps = (r.step for r in readings)
     return dict(zip(steps, np.cumsum(changes, dtype=np.int64).tolist(), strict=True))
-
-
-def _drift_noise(points: Sequence[Reading], drifts: Mapping[int, Drift]) -> tuple[SharedError, ...]:
-    """Noise of the drift checks as shared errors: each check affects the points next to it.
-
-    The level at a point is interpolated between the check before it and the one after. One of the
-    two has an even number and the other an odd one, so two errors hold all of them. A third is the
-    block's first check, relative to which all levels of the block are given, with opposite sign.
-    """
-    if not any(drift.level.size for drift in drifts.values()):
-        return ()
-    u_relative = np.zeros((3, len(points)))
-    check = np.zeros((3, len(points)), dtype=np.int64)
-    block, time_s = (np.array([getattr(p, n) for p in points]) for n in ("block", "time_s"))
-    passed = 0
-    for number, drift in drifts.items():
-        own = np.flatnonzero(block == number)
-        if drift.level.size and own.size:
-            u, (before, share) = drift.u_relative, drift.interpolation(time_s[own])
-            after = np.minimum(before + 1, u.size - 1)
-            u_relative[0, own], check[0, own] = u[0], passed
-            for made, part in ((before, 1.0 - share), (after, share)):
-                row = np.where(made == 0, 0, 1 + made % 2)
-                u_relative[row, own] -= part * u[made]
-                check[row, own] = passed + made
-        passed += drift.level.size
-    return tuple(SharedError(DRIFT, u, group) for u, group in zip(u_relative, check, strict=True))
-
-
-def _drift_between(
-    points: Sequence[Reading], drifts: Mapping[int, Drift]
-) -> tuple[SharedError, ...]:
-    """Error of a level that may have changed at any moment between two checks; none if steady."""
-    block, time_s = (np.array([getattr(p, n) for p in points]) for n in ("block", "time_s"))
-    u, group = np.zeros(len(points)), np.zeros(len(points), dtype=np.int64)
-    for number, drift in drifts.items():
-        own = np.flatnonzero(block == number)
-        if drift.level.size and own.size:
-            u[own] = drift.u_between(time_s[own])
-            group[own] = drift.interpolation(time_s[own])[0] + 1 + group.max()
-    return (SharedError(DRIFT, u, group),) if u.any() else ()
 
 
 def _shared_by_tile(

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from acquisition.measure.type_a import noise_ratio
 from acquisition.results.damage import damage_text
+from acquisition.results.effects.lamp_level import DRIFT, WANDER
 from acquisition.results.effects.lens import STRAY, VIGNETTING, WALLS
 from acquisition.results.effects.polarisation import CAMERA, LAMP
 from acquisition.results.effects.rig_effects import stated_sizes
@@ -48,6 +50,7 @@ Budget = tuple[tuple[str, float, float], ...]
 
 FEW_BITS = 8  # of a camera whose rounding deserves a note
 NOTABLE_PULL = 2.0  # in u
+_NOTABLE_SCATTER = 1.5  # measured over predicted
 _TOLD_SHARE = 0.7  # of the stated u of an effect, below which the data tell its size
 VERDICTS = {
     "adequate": "the simplest model that explains the data within their uncertainty",
@@ -58,6 +61,7 @@ VERDICTS = {
 _SOURCES = {
     **dict.fromkeys((NOISE, ROUNDING), "noise"),
     **dict.fromkeys((DARK, DARK_DRIFT), "dark"),
+    **dict.fromkeys((DRIFT, WANDER), "lamp drift"),
     **dict.fromkeys((LINEARITY, NONLINEAR), "linearity"),
     **dict.fromkeys((FLAT, VIGNETTING), "flat field"),
     **dict.fromkeys((STRAY, WALLS), "stray light"),
@@ -161,6 +165,7 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         _hidden_note(record),
         _flag_note(reduced),
         _drift_note(reduced),
+        _scatter_note(reduced, loaded),
         _pull_note(fitted),
         _effects_note(fitted, loaded),
         _bits_note(reduced, fitted, loaded),
@@ -283,6 +288,23 @@ def _pull_note(fitted: Fitted) -> str:
     pulls = fitted.chosen.pulls if fitted.chosen is not None else {}
     large = [f"{name}, {pull:+.1f} u" for name, pull in pulls.items() if abs(pull) > NOTABLE_PULL]
     return f"large shared errors in the fit: {'; '.join(large)}" if large else ""
+
+
+def _scatter_note(reduced: Reduced, loaded: Loaded) -> str:
+    """Scatter of frames and of drift checks that is far above what noise predicts."""
+    frames = noise_ratio(reduced.points, loaded.rig.camera)
+    texts = (
+        f"frames of one reading scatter {frames:.2g} times as much as photons and read-out explain "
+        "(median): the lamp flickers, or full_well_electrons in the rig file is too large"
+        if frames > _NOTABLE_SCATTER
+        else "",
+        f"drift checks scatter {reduced.drift_scatter:.2g} times as much as their noise about a "
+        "steady drift: the lamp wanders between them; let it warm up, or lower every_points"
+        if reduced.drift_scatter > _NOTABLE_SCATTER
+        else "",
+    )
+    found = "; ".join(text for text in texts if text)
+    return f"{found}. The larger scatter is in the uncertainty" if found else ""
 
 
 def _effects_note(fitted: Fitted, loaded: Loaded) -> str:

@@ -1,1 +1,1 @@
-"""Effects that a rig file states and no command measures: open `rig_effects`."""
+"""Effects of bench and lamp on the values of a run: open `rig_effects`."""

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acquisition.results.effects.lamp_level import DRIFT
 from acquisition.results.fitting import measurements
 from acquisition.results.measurements_csv import measurements_csv
-from acquisition.results.reduction import DRIFT, TILE, TILE_PLACEMENT, reduce, root_sum_square
+from acquisition.results.reduction import TILE, TILE_PLACEMENT, reduce, root_sum_square
 from analysis.data.csv_table import read_table
 from analysis.models import MODELS
 from instrument.config.load import Loaded

@@ -152,3 +152,16 @@ def test_what_the_interlocks_noted_and_jumps_of_the_lamp_are_told(
     found = notes(reduced, fitted, record, loaded)
     assert "interlocks noted: dark at 0.1 s: +3 DN (1 more, see the events in the record)" in found
     assert any("the lamp level had jumped 1 time and is followed from there" in n for n in found)
+
+
+def test_a_scatter_far_above_the_noise_is_named_with_its_ratio(
+    results: Results, record: Record
+) -> None:
+    loaded, reduced, fitted, found = results
+    assert not any("times as much as" in note for note in found)
+    points = tuple(replace(p, u_noise_dn=4 * p.u_noise_dn) for p in reduced.points)
+    unsteady = replace(reduced, points=points, drift_scatter=2.5)
+    (note,) = (n for n in notes(unsteady, fitted, record, loaded) if "times as much as" in n)
+    ratio = float(note.split("scatter ")[1].split(" times")[0])
+    assert 2.5 < ratio < 6
+    assert "drift checks scatter 2.5 times as much as their noise" in note
