@@ -19,14 +19,20 @@ SPECTRALON = SimulatedTile(at_normal=1.057, falloff=0.18, forward=0.5)
 
 
 def table_text(
-    true: SimulatedTile, u: float, u_common: float, random: np.random.Generator | None = None
+    true: SimulatedTile,
+    u: float,
+    u_common: float,
+    random: np.random.Generator | None = None,
+    common: float | None = None,
 ) -> str:
     """A certificate of a tile seen at 10 deg, each 15 deg of theta_i, with drawn errors of its u.
 
-    `u`: of each value by itself, `u_common`: of an error of them all.
+    `u`: of each value by itself, `u_common`: of an error of them all, which is `common` of its u,
+    or drawn.
     """
     drawn = random or np.random.default_rng(0)
     scale = u_common * drawn.standard_normal() if random else 0.0
+    scale = scale if common is None else u_common * common
     lines = ["theta_i_deg,theta_r_deg,dphi_deg,beta,u_beta,u_beta_common"]
     for theta_i in np.arange(0.0, 76.0, 15.0):
         for dphi in (0.0, 180.0):

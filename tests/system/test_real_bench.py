@@ -22,7 +22,7 @@ _COVERED = 1.96
 
 
 def _pulls(folder: Path, runs: int) -> list[Pulls]:
-    loaded = (real_bench_run(number, folder) for number in range(runs))
+    loaded = (real_bench_run(number, folder, runs) for number in range(runs))
     return [pulls_of(one, folder / str(number)) for number, one in enumerate(loaded)]
 
 

@@ -3,7 +3,7 @@
 Light that comes out of the sample's inside has passed its surface twice, and light of the mirror
 side is reflected by facets; both prefer one polarisation, by Fresnel's formulas for an index of
 1.5, which is near that of most dielectrics. The tile is a perfect depolariser. Which part of a
-value the facets reflect is estimated from the values themselves, by a quick fit of a rough matt
+value the facets reflect is estimated from the values themselves, by quick fits of a rough matt
 surface with a lobe.
 """
 
@@ -23,6 +23,7 @@ from instrument.geometry import FloatArray, camera_direction, lamp_direction
 
 LAMP, CAMERA = "polarisation of the lamp", "polarisation of the camera"
 _INDEX = 1.5
+_BODY, _LOBES = "oren_nayar", ("torrance_sparrow_lobe", "ggx")
 _U_FIT = 0.01  # relative, of the values in the quick fit
 
 
@@ -49,23 +50,24 @@ def polarisation_effects(readings: Readings) -> Iterator[Effect]:
 
 
 def _share_of_facets(readings: Readings) -> FloatArray:
-    """Share of the values, (N,), that the facets of the surface reflect, by a quick fit.
+    """Share of the values, (N,), that the facets of the surface reflect, by quick fits.
 
     It lies between 0 and 1, and is 0 where there are too few points to tell.
     """
     theta_i, theta_r, dphi = readings.angles_deg()
     known = np.isfinite(readings.value) & (readings.value > 0)
-    value = readings.value[known]
-    split, share = MODELS["oren_nayar+torrance_sparrow_lobe"], np.zeros(known.size)
+    value, share = readings.value[known], np.zeros(known.size)
+    m = Measurements.bare(theta_i[known], theta_r[known], dphi[known], value, _U_FIT * value)
+    fits = FirstFits(m)
     try:
-        m = Measurements.bare(theta_i[known], theta_r[known], dphi[known], value, _U_FIT * value)
-        found = FirstFits(m).of(split)
+        best = min((fits.of(MODELS[f"{_BODY}+{lobe}"]) for lobe in _LOBES), key=lambda one: one.bic)
     except NotDetermined:
         return share
-    fitted = dict(zip((p.name for p in split.parameters), found.solution.x.tolist(), strict=True))
-    lobe = MODELS["torrance_sparrow_lobe"]
+    names = (p.name for p in best.model.parameters)
+    fitted = dict(zip(names, best.solution.x.tolist(), strict=True))
+    lobe = MODELS[best.model.name.removeprefix(f"{_BODY}+")]
     facets = lobe.brdf(m.geometry, **{p.name: fitted[p.name] for p in lobe.parameters})
-    share[known] = np.clip(facets / np.maximum(found.brdf(m.geometry), 1e-12), 0.0, 1.0)
+    share[known] = np.clip(facets / np.maximum(best.brdf(m.geometry), 1e-12), 0.0, 1.0)
     return share
 
 

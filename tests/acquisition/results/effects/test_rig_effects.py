@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ GLOSSY = SimulatedSample(
     model="lambert+torrance_sparrow", parameters={"albedo": 0.4, "ks": 0.1, "sigma_deg": 20.0}
 )
 BASE = small_scan("bench_12bit", 8)
-IN_PLANE = [(i, 0.0, r) for i in (20.0, 60.0) for r in (-78.0, -40.0, 0.0, 40.0, 78.0)]
+IN_PLANE = [(i, 0.0, r) for i in (20.0, 60.0) for r in (-78.0, -40.0, 10.0, 70.0)]
 OUT_OF_PLANE = [(40.0, 90.0, -60.0), (40.0, 90.0, 60.0), (60.0, 45.0, -70.0), (60.0, 120.0, 35.0)]
 _TILE_DEG = 10.0
 
@@ -52,12 +53,16 @@ def bench(sample: SimulatedSample, **simulation: Any) -> Loaded:
 
 def values(loaded: Loaded, places: list[tuple[float, float, float]]) -> FloatArray:
     """Window's mean of the sample over the tile's, without noise, at each place."""
-    return np.array(
-        [
-            _mean(loaded, "sample", *place) / _mean(loaded, "white tile", *place[:2], _TILE_DEG)
-            for place in places
-        ]
-    )
+    lamps = {place[:2] for place in places}
+    tiles = {lamp: _mean(loaded, "white tile", *lamp, _TILE_DEG) for lamp in lamps}
+    return np.array([_mean(loaded, "sample", *p) / tiles[p[:2]] for p in places])
+
+
+@cache
+def sound_values(model: str, count: int) -> FloatArray:
+    """Values of the bench without errors, for the sample with this model."""
+    sample = next(s for s in (MATT, DARK, GLOSSY) if s.model == model)
+    return values(bench(sample), [*IN_PLANE, *OUT_OF_PLANE][:count])
 
 
 def _mean(loaded: Loaded, surface: Surface, theta_i: float, dphi: float, theta_r: float) -> float:
@@ -202,7 +207,7 @@ def test_an_effect_has_shape_and_sign_of_the_simulated_defect(name: str) -> None
     effects, sample, defect, line, close = CASES[name]
     sound, faulty = bench(sample), bench(sample, **defect)
     places = IN_PLANE + (OUT_OF_PLANE if effects is not lens_effects else [])
-    found = values(faulty, places) / values(sound, places) - 1
+    found = values(faulty, places) / sound_values(sample.model, len(places)) - 1
     (effect,) = effects(readings(sound, places, brdf(sample, places), **line))
     expected = predicted(effect, sound, places)
     assert np.allclose(found, expected, atol=close * np.max(np.abs(found)), rtol=0)
