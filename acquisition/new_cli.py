@@ -47,9 +47,10 @@ def rig(
 ) -> None:
     """Write a rig file: cameras and serial ports found are offered, and a simulated rig.
 
-    Nothing moves; cameras are only asked for their formats, sizes and controls. A calibration of
-    the camera, if named, fills in its noise and gain. Without a terminal the defaults are taken.
-    --identify is that of `gonio devices`: do not use it while other machines are connected.
+    Nothing moves; cameras are only asked for their formats, sizes and controls. Calibrations of
+    camera, lamp and geometry, if named, fill in what they found. Without a terminal the defaults
+    are taken. --identify is that of `gonio devices`: do not use it while other machines are
+    connected.
     """
     from acquisition.commands.new import new_rig
 

@@ -14,6 +14,7 @@ from acquisition.terminal.console import ask, console, print_lines
 from acquisition.terminal.orderly_end import orderly_end
 from instrument.calibration.archive import SUFFIX
 from instrument.calibration.camera_file import is_camera_file
+from instrument.calibration.geometry_file import is_geometry_file
 from instrument.calibration.lamp_file import is_lamp_file
 from instrument.config.load import load_rig
 from instrument.errors import InputError
@@ -38,6 +39,7 @@ def new_rig(path: Path | None, given: Sequence[str], *, defaults: bool, identify
         ports=found_ports(identify),
         calibrations=_newest(path.parent, is_camera_file),
         lamp_calibrations=_newest(path.parent, is_lamp_file),
+        geometries=_newest(path.parent, is_geometry_file),
     )
     _write(path, answers, defaults, lambda scratch: rig_draft(bench, scratch))
     print_lines([f"file: {path}", f"next: gonio new protocol --rig {path} -o protocol.yaml"])

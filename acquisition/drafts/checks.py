@@ -47,10 +47,10 @@ def rig_draft(bench: Bench, scratch: Path) -> Draft:
 
 
 def _from_anywhere(bench: Bench, answers: Answers) -> Answers:
-    """Return answers with the whole path of the calibration, for a trial in another folder."""
-    if answers["calibration"] == NONE:
-        return answers
-    return {**answers, "calibration": str(bench.folder.absolute() / str(answers["calibration"]))}
+    """Return answers with the whole paths of calibrations, for a trial in another folder."""
+    named = [key for key in ("calibration", "geometry") if answers[key] != NONE]
+    folder = bench.folder.absolute()
+    return {**answers, **{key: str(folder / str(answers[key])) for key in named}}
 
 
 def _plan_usual(rig: Rig, rig_path: Path, protocol: Path) -> None:

@@ -14,6 +14,7 @@ from acquisition.drafts.question import Answers, Question, Script, choice, numbe
 from acquisition.drafts.yaml_words import Value, in_comment
 from drivers.discovery import FoundPort
 from drivers.v4l2.listing import FoundCamera
+from instrument.calibration.geometry_file import read_geometry_file
 from instrument.config.axes import AXES, EMULATED
 from instrument.errors import InputError
 from instrument.text.quoting import shown
@@ -34,8 +35,8 @@ _SIZE = re.compile(r"([0-9]{1,5}) ?[x×] ?([0-9]{1,5})")
 class Bench:
     """Files and devices that the questions offer.
 
-    folder: of the new file; name: its name without the ending. calibrations, lamp_calibrations:
-    files of `gonio calibrate camera` and `gonio calibrate lamp` in that folder.
+    folder: of the new file; name: its name without the ending. calibrations, lamp_calibrations,
+    geometries: files of `gonio calibrate camera`, `lamp` and `geometry` in that folder.
     """
 
     folder: Path
@@ -44,6 +45,7 @@ class Bench:
     ports: Sequence[FoundPort] = ()
     calibrations: Sequence[Path] = ()
     lamp_calibrations: Sequence[Path] = ()
+    geometries: Sequence[Path] = ()
 
     def usable(self) -> list[FoundCamera]:
         """Return the cameras with a pixel format that the program can use."""
@@ -129,6 +131,9 @@ def _picture(bench: Bench, answers: Answers) -> Script:
             "camera.gain", "gain in the camera's own unit", found.gain.value,
             gain.minimum, gain.maximum, whole=True,
         )  # fmt: skip
+    yield _geometry(bench, answers)
+    if answers["geometry"] != NONE:
+        return
     yield number(
         "camera.field_width_mm",
         "width of what the picture shows at the sample, in mm",
@@ -182,6 +187,21 @@ def _calibration(bench: Bench, answers: Answers) -> Question:
 
     text = "calibration of the camera"
     return _file("calibration", text, bench.folder, bench.calibrations, require)
+
+
+def _geometry(bench: Bench, answers: Answers) -> Question:
+    """Question of the file that gives the place and scale of the picture, and theta_r's zero."""
+
+    def require(path: Path) -> None:
+        width, height = size_px(answers)
+        if read_geometry_file(path).size_px != (width, height):
+            raise InputError(
+                f"{path.name}: is of a camera with pictures of another size; allowed: {width} x "
+                f"{height}, as answered before"
+            )
+
+    text = "calibration of the geometry"
+    return _file("geometry", text, bench.folder, bench.geometries, require)
 
 
 def _lamp_calibration(bench: Bench) -> Question:

@@ -10,6 +10,7 @@ from acquisition.drafts.calibrated import USUAL_WANDER_DN, Calibrated, lamp_flic
 from acquisition.drafts.question import Answers, number_of
 from acquisition.drafts.rig_questions import DEPTHS, NONE, Bench, is_simulated, size_px
 from acquisition.drafts.yaml_words import in_comment, line
+from instrument.calibration.geometry_file import GeometryCalibration, read_geometry_file
 from instrument.config.axes import AXES
 from instrument.config.camera import LIMITED_BLACK_DN, LIMITED_WHITE_DN, V4L2_EXPOSURE_STEP_S
 
@@ -34,9 +35,15 @@ def _lines(bench: Bench, answers: Answers) -> Iterator[str]:
     yield ""
     yield from _distances(answers)
     yield ""
+    found = _geometry(bench, answers)
+    if found is not None:
+        yield f"# Geometry with {in_comment(found.camera)}, {found.date_utc[:10]}: it gives the"
+        yield "# camera's scale, axis and roll, which are not typed here, and the zero of theta_r."
+        yield line("geometry", answers["geometry"], "of gonio calibrate geometry")
+        yield ""
     yield "axes:                          # each as gonio move and gonio devices --rig name it"
     for axis in AXES:
-        yield from _axis(axis, answers)
+        yield from _axis(axis, answers, found)
     yield ""
     yield "# Forbidden zones, checked on the whole path of each move; remove the # of both lines:"
     yield "# keep_out:"
@@ -72,7 +79,19 @@ def _cone_sr(diameter_mm: float, distance_mm: float) -> float:
     return float(f"{4 * math.pi * math.sin(half / 2) ** 2:.6g}")
 
 
-def _axis(name: str, answers: Answers) -> Iterator[str]:
+def _geometry(bench: Bench, answers: Answers) -> GeometryCalibration | None:
+    named = answers["geometry"]
+    return None if named == NONE else read_geometry_file(bench.folder / str(named))
+
+
+def _zero(name: str, answers: Answers, found: GeometryCalibration | None) -> tuple[float, int, str]:
+    """Return what an axis's device reads at 0, its sign, and how that is known."""
+    if found is None or name != "theta_r" or is_simulated(answers):
+        return 0.0, 1, "assumed"
+    return float(f"{found.zero_deg:.6g}"), found.sign, "calibrated"
+
+
+def _axis(name: str, answers: Answers, found: GeometryCalibration | None) -> Iterator[str]:
     driver = str(answers[f"{name}.driver"])
     yield f"  {name}:".ljust(31) + f"# {USUAL[name].text}"
     yield line("driver", driver, "hand: the operator sets it" if driver == "hand" else "", 4)
@@ -82,13 +101,17 @@ def _axis(name: str, answers: Answers) -> Iterator[str]:
         yield line(key, answers[f"{name}.{key}"], "", 4)
     yield line("min_deg", answers[f"{name}.min_deg"], "software limits: no move goes past them", 4)
     yield line("max_deg", answers[f"{name}.max_deg"], "", 4)
+    zero_deg, sign, known = _zero(name, answers, found)
     if driver == "hand":
+        if found is not None and name == "theta_r":
+            yield line("zero_deg", zero_deg, f"{known}: what its scale shows at 0", 4)
+            yield line("sign", sign, f"{known}: -1 if the scale counts the other way", 4)
         yield line("u_deg", 0.25, "assumed: a protractor read to half a degree (k = 1)", 4)
         yield line("set_s", 60.0, "assumed: time to set it", 4)
         return
     speed = number_of(answers, f"{name}.speed_deg_per_s")
-    yield line("zero_deg", 0.0, "assumed: what the device reads when the axis is at 0", 4)
-    yield line("sign", 1, "assumed: -1 if the device counts the other way", 4)
+    yield line("zero_deg", zero_deg, f"{known}: what the device reads when the axis is at 0", 4)
+    yield line("sign", sign, f"{known}: -1 if the device counts the other way", 4)
     yield line("speed_deg_per_s", speed, "of every move", 4)
     yield line("acceleration_deg_per_s2", 2 * speed, "assumed: full speed after half a second", 4)
     yield line("settle_s", 0.3, "assumed: the beam swings after a move", 4)
@@ -104,18 +127,25 @@ def _camera(bench: Bench, answers: Answers) -> Iterator[str]:
     yield from _driver(bench, answers)
     yield line("width_px", width, "size of the picture", 2)
     yield line("height_px", height, "", 2)
-    field = "of the picture's width, at the rotation axis"
-    yield line("field_width_mm", answers["camera.field_width_mm"], field, 2)
-    middle = "assumed: the middle; gonio grab shows where the axis stands"
-    yield line("axis_row_px", (height - 1) / 2, middle, 2)
-    yield line("axis_column_px", (width - 1) / 2, "", 2)
-    yield line("roll_deg", 0.0, "assumed: turn of the picture about the lens's axis", 2)
+    if answers["geometry"] == NONE:
+        yield from _place(answers)
     yield line("bit_depth", _bit_depth(answers), "of a count", 2)
     yield from _sensor(bench, answers)
     low, high, source = _exposures_s(bench, answers)
     yield line("min_exposure_s", low, source, 2)
     yield line("max_exposure_s", high, source, 2)
     yield line("frame_overhead_s", 0.02, "assumed: from the end of an exposure to the next", 2)
+
+
+def _place(answers: Answers) -> Iterator[str]:
+    """Yield the lines of scale and place of the picture, which nobody has calibrated."""
+    width, height = size_px(answers)
+    field = "of the picture's width, at the rotation axis"
+    yield line("field_width_mm", answers["camera.field_width_mm"], field, 2)
+    middle = "assumed: the middle; gonio calibrate geometry finds the axis"
+    yield line("axis_row_px", (height - 1) / 2, middle, 2)
+    yield line("axis_column_px", (width - 1) / 2, "", 2)
+    yield line("roll_deg", 0.0, "assumed: turn of the picture about the lens's axis", 2)
 
 
 def _driver(bench: Bench, answers: Answers) -> Iterator[str]:

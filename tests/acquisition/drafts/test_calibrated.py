@@ -14,6 +14,7 @@ from acquisition.drafts.interview import Interview
 from acquisition.drafts.rig_questions import Bench
 from instrument.calibration.camera_calibration import MAPS, CameraCalibration
 from instrument.calibration.camera_file import is_camera_file, write_camera_file
+from instrument.calibration.geometry_file import write_geometry_file
 from instrument.calibration.lamp_file import (
     LampCalibration,
     LightMap,
@@ -24,7 +25,9 @@ from instrument.calibration.quantity import Quantity
 from instrument.calibration.response_curve import POLYNOMIAL, ResponseCurve
 from instrument.config.load import load_rig
 from instrument.errors import InputError
+from tests.support.calibration.geometry_files import FOUND as GEOMETRY
 
+REAL = {"camera": "/dev/video9", "camera.size": "640 x 512"}
 FOUND = {
     "gain_dn_per_electron": (0.2, 0.001, "DN/e-"),
     "dark_noise_electrons": (6.25, 0.04, "e-"),
@@ -144,3 +147,40 @@ def test_another_file_is_no_calibration(tmp_path: Path) -> None:
     for name in ("x.npz", "gone.npz", "y" * 300):
         with pytest.raises(InputError, match=r"--set calibration: .*(is no camera cal|cannot be)"):
             rig_text(tmp_path, calibration=name)
+
+
+@pytest.mark.parametrize(
+    ("zero_deg", "sign", "given"),
+    [
+        (-0.05, 1, {}),
+        (90.25, -1, REAL | {"theta_r.driver": "hand"}),
+        (90.25, -1, REAL | {"theta_r.driver": "newport", "theta_r.port": "/dev/ttyUSB0"}),
+    ],
+    ids=["simulated", "hand", "motor"],
+)
+def test_a_geometry_takes_the_place_of_typed_numbers(
+    tmp_path: Path, zero_deg: float, sign: int, given: dict[str, str]
+) -> None:
+    """Also of a stage that is mounted at any angle; a simulated rig keeps its own zero."""
+    write_geometry_file(tmp_path / "g.npz", replace(GEOMETRY, zero_deg=zero_deg, sign=sign))
+    (tmp_path / "scratch").mkdir()
+    bench = Bench(folder=tmp_path, name="bench", geometries=[tmp_path / "g.npz"])
+    text = Interview(given=given | {"geometry": "g.npz"}).text_of(
+        rig_draft(bench, tmp_path / "scratch")
+    )
+    assert "field_width_mm:" not in text
+    path = tmp_path / "rig.yaml"
+    path.write_text(text)
+    rig = load_rig(path)
+    assert rig.camera.field_width_mm == GEOMETRY.field_width_mm
+    assert (rig.axes.theta_r.zero_deg, rig.axes.theta_r.sign) == (zero_deg, sign)
+
+
+def test_a_geometry_of_another_picture_is_refused(tmp_path: Path) -> None:
+    write_geometry_file(tmp_path / "g.npz", GEOMETRY)
+    (tmp_path / "scratch").mkdir()
+    bench = Bench(folder=tmp_path, name="bench", geometries=[tmp_path / "g.npz"])
+    with pytest.raises(InputError, match=r"--set geometry: .*another size; allowed: 64 x 48"):
+        Interview(given={"camera.size": "64 x 48", "geometry": "g.npz"}).text_of(
+            rig_draft(bench, tmp_path / "scratch")
+        )
