@@ -26,6 +26,8 @@ CORNER_COLUMNS = (
 )  # fmt: skip
 CAMERA_KEYS = ("field_width_mm", "axis_row_px", "axis_column_px", "roll_deg")
 """Keys of a rig file's camera that such a calibration gives."""
+ZERO = "theta_r_zero_error_deg"
+"""Key of the quantity that tells how far the zero was off."""
 _ARCHIVE = Archive("geometry", 1)
 is_geometry_file = _ARCHIVE.wrote
 """True for a path of such a file, which may be damaged all the same."""
@@ -64,6 +66,11 @@ class GeometryCalibration:
     def camera_values(self) -> dict[str, float]:
         """Return the values of `CAMERA_KEYS`."""
         return {key: getattr(self, key) for key in CAMERA_KEYS}
+
+    @property
+    def u_zero_deg(self) -> float:
+        """Standard uncertainty of the zero of theta_r, in degrees."""
+        return self.quantities[ZERO].u or 0.0
 
     def require_camera(self, name: str, camera: str) -> None:
         """Raise `InputError` if the file `name` is of another camera."""
@@ -119,7 +126,8 @@ def _calibration(path: Path, header: dict[str, Any], digest: str) -> GeometryCal
             notes=tuple(own["notes"]), arrays={}, sha256=digest,
         )  # fmt: skip
         found = GeometryCalibration(**own)
-        numbers = (*found.camera_values().values(), found.zero_deg, float(found.sign))
+        place = (*found.camera_values().values(), found.zero_deg, float(found.sign))
+        numbers = (*place, found.u_zero_deg)
         if not all(map(math.isfinite, numbers)):
             raise ValueError("a value is not finite")
     except (LookupError, TypeError, ValueError, AttributeError) as error:

@@ -132,7 +132,8 @@ class Rig(Section):
     """Complete rig file.
 
     `geometry`: file of `gonio calibrate geometry`, beside the rig file. It gives the camera's
-    `field_width_mm`, `axis_row_px`, `axis_column_px` and `roll_deg`, and `zero_deg` of theta_r.
+    `field_width_mm`, `axis_row_px`, `axis_column_px` and `roll_deg`, and `zero_deg` of theta_r with
+    its `u_zero_theta_r_deg`.
     """
 
     name: Name
@@ -167,9 +168,11 @@ class Rig(Section):
     def with_geometry(self, measured: GeometryCalibration) -> Self:
         """Return a copy that takes the values of its `geometry`."""
         axis = self.axes.theta_r.with_zero(measured.zero_deg)
+        u_deg = measured.u_zero_deg
         update = {
             "camera": self.camera.model_copy(update=measured.camera_values()),
             "axes": self.axes.model_copy(update={"theta_r": axis}),
+            "uncertainty": self.uncertainty.model_copy(update={"u_zero_theta_r_deg": u_deg}),
         }
         rig = self.model_copy(update=update)
         rig._measured, rig._typed = measured, self

@@ -17,7 +17,7 @@ from acquisition.results.versions import versions_of
 from analysis.calibration.geometry.corners import Corners
 from analysis.calibration.geometry.geometry_fit import GeometryFit, fit_geometry
 from analysis.calibration.level_series import Estimate
-from instrument.calibration.geometry_file import GeometryCalibration
+from instrument.calibration.geometry_file import ZERO, GeometryCalibration
 from instrument.calibration.quantity import Quantity
 from instrument.config.rig import Rig
 from instrument.errors import NotDetermined
@@ -115,7 +115,7 @@ def _quantities(fit: GeometryFit, plan: GeometryPlan) -> Iterator[tuple[str, Qua
     ):
         yield key, quantity(values[key], unit, "", name)
     zero = quantity(values["zero_deg"], "deg", "", "zero of theta_r: true minus shown")
-    yield "theta_r_zero_error_deg", zero
+    yield ZERO, zero
     yield "theta_i_zero_error_deg", quantity(None, "deg", "", "zero of theta_i")
     for key, unit, name in (
         ("table_lean_deg", "deg", "lean of the table, across"),

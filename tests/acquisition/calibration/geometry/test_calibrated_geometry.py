@@ -54,6 +54,7 @@ def test_the_rig_takes_the_values_with_or_without_numbers_of_its_own(
         assert getattr(pinhole, key) == value
         stated = value if without else BENCH["camera"].get(key)
         assert getattr(rig.typed.camera, key) == stated
+    assert rig.uncertainty.u_zero_theta_r_deg == 0.01
     assert (rig.axes.theta_r.zero_deg, rig.typed.axes.theta_r.zero_deg) == (-0.05, 0.0)
 
 
