@@ -28,7 +28,7 @@ _FIRST_PX = 0.05  # of a corner, before it is known: that of OpenCV's refinement
 _FIRST = {"columns": 0.05, "rows": 0.05, "bends": 0.03, "print": 0.005}
 """Standard deviations of the groups before they are known: small ones, which grow at once if they
 must, while large ones shrink slowly."""
-_LEAST = {"axis": 1e-3, "columns": 2e-3, "rows": 2e-3, "bends": 0.03, "print": 2e-3}
+_LEAST = {"axis": 1e-3, "columns": 2e-3, "rows": 2e-3, "bends": 0.02, "print": 2e-3}
 """Least ones. Blur, light and the phase of pixels move corners alike in all pictures, which no
 scatter shows: by as much on the simulated bench with all its defects."""
 _LEAST_PX = 2e-3  # of a corner: keeps weights finite
