@@ -11,7 +11,6 @@ from analysis.calibration.geometry.geometry_fit import fit_geometry
 from analysis.calibration.geometry.parameters import NAMES
 from tests.support.calibration.board_pictures import NOMINAL, Drawn, drawn
 
-
 FOUND = [name for name in NAMES if not name.startswith("centre")]
 """The middle of a distortion of nearly nothing is a product: its u is that of a linear fit."""
 
