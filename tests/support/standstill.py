@@ -76,7 +76,10 @@ def is_repeated(item: pytest.Item) -> bool:
 
 
 def run_in_real_time(item: pytest.Item, nextitem: pytest.Item | None) -> None:
-    """Run a test, and again if it failed while the machine stood still; report the last time."""
+    """Run a test, and again if it, or a fixture of it, failed while the machine stood still.
+
+    The last time is reported.
+    """
     item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
     causes: list[str] = []
     while True:
@@ -86,8 +89,11 @@ def run_in_real_time(item: pytest.Item, nextitem: pytest.Item | None) -> None:
         if not cause or len(causes) + 1 == TRIES or not any(r.failed for r in reports):
             break
         causes.append(cause)
+        if any(r.failed and r.when == "setup" for r in reports):
+            # A module's or session's fixture: pytest keeps its error until it is torn down.
+            item.session._setupstate.teardown_exact(None)
     for report in reports:
-        if causes and report.when == "call":
+        if causes and (report.when == "call" or report.failed):
             report.user_properties.append((_PROPERTY, ", ".join(causes)))
         item.ihook.pytest_runtest_logreport(report=report)
     item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)

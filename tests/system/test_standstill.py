@@ -54,6 +54,19 @@ def test_fails_once_in_short_standstills():
             time.sleep(0.005)
         assert not "failed"
 
+@pytest.fixture(scope="module")
+def shared():
+    if count("shared") < 3:
+        stand_still()
+        assert not "failed"
+    return "made"
+
+def test_needs_a_fixture_that_fails_twice_in_a_standstill(shared):
+    assert shared == "made"
+
+def test_needs_the_same_fixture(shared):
+    assert shared == "made"
+
 def test_fails_always_in_a_standstill():
     count("always")
     stand_still()
@@ -67,7 +80,7 @@ def test_passes_in_a_standstill():
     count("passes")
     stand_still()
 """
-NAMES = ("twice", "short", "always", "passes")
+NAMES = ("twice", "short", "shared", "always", "passes")
 
 
 def test_a_failure_in_a_standstill_is_repeated_and_any_other_counts(tmp_path: Path) -> None:
@@ -80,8 +93,9 @@ def test_a_failure_in_a_standstill_is_repeated_and_any_other_counts(tmp_path: Pa
         cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
     times = {name: len((tmp_path / name).read_text()) for name in NAMES}
-    assert times == {"twice": 3, "short": 2, "always": TRIES, "passes": 1}, done.stdout
-    assert "2 failed, 3 passed" in done.stdout
+    wanted = {"twice": 3, "short": 2, "shared": 3, "always": TRIES, "passes": 1}
+    assert times == wanted, done.stdout
+    assert "2 failed, 5 passed" in done.stdout
     repeated = "test_fails_twice_in_a_standstill: repeated, as the machine stood still for 0."
     assert repeated in done.stdout
     if (
