@@ -6,6 +6,7 @@ tells it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from datetime import datetime
 
@@ -28,6 +29,7 @@ _USUAL_RMS_PX = 0.3  # a sheet that is 0.05 mm off flat, seen at 60 degrees with
 _BEAM_PERCENT = 5.0  # a tape measure is better; a board of another size is worse
 _NOTABLE = 3.0  # times u
 _WANDERS = 1.5  # times the axis's u_deg
+_NARROW_PX = 25.0  # of a square: with fewer, corners are biased by what is next to them
 _FEW = 0.95  # share of the corners that lie where the others let expect them
 THETA_I_TEXT = (
     "the zero of theta_i is not determined: a camera sees the lamp's angle only by a mirror-like "
@@ -157,6 +159,14 @@ def _notes(fit: GeometryFit, plan: GeometryPlan) -> Iterator[str]:
             f"{fit.lens.beam_length_mm:.4g} mm does (entrance pupil of the lens to the axis)"
         )
     scatter_deg = fit.spread["axis"]
+    per_mm = fit.lens.width_px / fit.lens.field_width_mm
+    narrow_px = per_mm * plan.board.square_mm * math.cos(math.radians(plan.widest_deg))
+    if narrow_px < _NARROW_PX:
+        yield (
+            f"squares are {narrow_px:.0f} px wide at {plan.widest_deg:g} deg; from {_NARROW_PX:g} "
+            "px on their corners are found without bias, which shows here as a scatter of theta_r "
+            "and a wrong beam: take fewer, larger squares, or a smaller --widest-deg"
+        )
     if scatter_deg > _WANDERS * rig.axes.theta_r.u_deg:
         yield (
             f"theta_r errs by {scatter_deg:.2g} deg from angle to angle; the rig file's u_deg is "

@@ -41,7 +41,9 @@ def test_drawn_benches_are_found_within_their_u(slow: bool) -> None:
     rows = []
     for seed in range(40 if slow else 1):
         truth = drawn_rig(seed)
-        rows.append(pulls(truth, calibrated(truth, STATED, **QUICK)))
+        calibration = calibrated(truth, STATED, **QUICK)
+        assert not any("squares are" in note for note in calibration.notes)
+        rows.append(pulls(truth, calibration))
     found = {key: np.array([row[key] for row in rows]) for key in rows[0]}
     everything = np.concatenate(list(found.values()))
     assert np.mean(np.abs(everything) < 3) > (0.97 if slow else 0.85), found
@@ -99,3 +101,14 @@ def test_squares_of_another_size_contradict_the_beam() -> None:
         geometry_of(
             own.corners, plan, camera="camera", stage="stage", skipped=[], now=datetime.now(UTC)
         )
+
+
+def test_squares_of_few_pixels_are_named() -> None:
+    own = drawn(1)
+    beam_mm = 800.0 * (1 + own.truth["beam_percent"] / 100)
+    rig = STATED.model_copy(update={"beam_length_mm": beam_mm})
+    plan = GeometryPlan(rig=rig, **(QUICK | {"widest_deg": 75.0}))
+    found = geometry_of(
+        own.corners, plan, camera="camera", stage="stage", skipped=[], now=datetime.now(UTC)
+    )
+    assert any("squares are 18 px wide at 75 deg" in note for note in found.notes)
