@@ -41,10 +41,15 @@ class StrayLight:
     errors_dn: FloatArray
 
     def subtracted(self, readings: Sequence[Reading]) -> list[Reading]:
-        """Return the readings without stray light in their signal."""
-        return [
-            replace(r, signal_dn=r.signal_dn - float(self.dn[self.steps[r.step]])) for r in readings
-        ]
+        """Return the readings without stray light in their signal; drift checks as they are.
+
+        Of these only ratios count, with those at a resume too, and their share of it is the same.
+        """
+        return [r if r.kind == "drift" else self._subtracted(r) for r in readings]
+
+    def _subtracted(self, reading: Reading) -> Reading:
+        stray_dn = float(self.dn[self.steps[reading.step]])
+        return replace(reading, signal_dn=reading.signal_dn - stray_dn)
 
     def errors_of(self, readings: Sequence[Reading]) -> FloatArray:
         """Return the errors (M, readings) of these readings, signed and in DN."""

@@ -70,6 +70,16 @@ def test_a_flagged_reading_says_nothing_of_the_lens() -> None:
     np.testing.assert_array_equal(spoilt.dn[1:], clean.dn)
 
 
+def test_a_drift_check_keeps_its_signal_as_one_at_a_resume_does() -> None:
+    readings, true = readings_of(np.array([0.004, 0.004, 0.004]), DARK.reflectance)
+    readings[3] = replace(readings[3], kind="drift")
+    found = stray_light(readings, RIG)
+    assert found is not None
+    light = [r.signal_dn for r in found.subtracted(readings)]
+    assert light[3] == readings[3].signal_dn
+    assert abs(readings[4].signal_dn - light[4] - true[4]) < 0.2 * true[4]
+
+
 def test_without_a_patch_or_a_picture_of_it_there_is_nothing_to_subtract() -> None:
     readings, _ = readings_of(np.array([0.004, 0.004, 0.004]), DARK.reflectance)
     assert stray_light(readings, SMALL.rig) is None
