@@ -83,9 +83,10 @@ def average_dark(frames: Sequence[Frame], camera: CameraConfig) -> Dark:
 
 
 def bright_level(counts: NDArray[Any]) -> float:
-    """Return the 99th percentile of counts of any shape, in DN: the exposure is set by it."""
+    """Return the 99th percentile of whole counts of any shape, in DN: the exposure is set by it."""
     rank = int(0.99 * (counts.size - 1))
-    return float(np.partition(counts.ravel(), rank)[rank])
+    up_to = np.cumsum(np.bincount(counts.ravel()))
+    return float(np.searchsorted(up_to, rank, side="right"))
 
 
 def measure(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition.measure.placement import Placement
-from acquisition.measure.radiometry import Dark, average_dark, measure
+from acquisition.measure.radiometry import Dark, average_dark, bright_level, measure
 from acquisition.measure.window import Window, window_at
 from instrument.config.load import load_rig
 from instrument.devices import Frame
@@ -123,3 +123,13 @@ def test_a_dark_between_two_counts_is_subtracted_as_it_is(part: float) -> None:
     )
     assert abs(signal.signal_dn - plain.signal_dn) < 4 * signal.u_noise_dn < 0.04
     assert signal.u_dark_dn < 0.01
+
+
+@pytest.mark.parametrize(("kind", "largest"), [(np.uint8, 255), (np.uint16, 4095)])
+def test_the_bright_level_is_the_99th_percentile_of_the_sorted_counts(
+    kind: type[np.uint8 | np.uint16], largest: int
+) -> None:
+    random = np.random.default_rng(3)
+    for size in (1, 2, 99, 100, 101, 5000):
+        counts = random.integers(0, largest + 1, size).astype(kind)
+        assert bright_level(counts) == np.sort(counts)[int(0.99 * (size - 1))]
