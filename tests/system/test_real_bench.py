@@ -21,8 +21,8 @@ _FEW = 2  # in a normal run
 _COVERED = 1.96
 
 
-def _pulls(folder: Path, runs: int) -> list[Pulls]:
-    loaded = (real_bench_run(number, folder, runs) for number in range(runs))
+def _pulls(folder: Path, runs: int, lines: dict[str, float] | None = None) -> list[Pulls]:
+    loaded = (real_bench_run(number, folder, runs, lines=lines) for number in range(runs))
     return [pulls_of(one, folder / str(number)) for number, one in enumerate(loaded)]
 
 
@@ -46,3 +46,13 @@ def test_deviations_on_a_real_bench_have_the_size_of_their_u(
         if np.max(np.abs(own)) > 6:
             wrong.append((name, mean, sd, float(np.max(np.abs(own)))))
     assert not wrong
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", ["stray_light", "tile_aged"])
+def test_a_correction_that_is_left_out_shows(effect: str, slow: bool, tmp_path: Path) -> None:
+    """At grazing view the mean deviation is then beyond its limit."""
+    if not slow:
+        pytest.skip("with --slow")
+    found = _pulls(tmp_path, 200, {effect: 0.0, f"u_{effect}": 0.0})
+    assert abs(float(np.mean(by_band(found)["75 to 85 deg"]))) > 0.15
