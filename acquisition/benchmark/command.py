@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from acquisition.benchmark.effort import QUICK, WHOLE
+from acquisition.benchmark.effort import QUICK, WHOLE, Effort
 from acquisition.benchmark.machine import machine
 from acquisition.benchmark.output.files import empty_folder, write
 from acquisition.benchmark.peers import peer_lines
@@ -24,7 +24,7 @@ def run_benchmark(folder: Path, quick: bool, with_maps: bool) -> None:
 
     effort, begun_s = QUICK if quick else WHOLE, time.monotonic()
     found = tuple(studies(effort, _tell))
-    pictures = _maps() if with_maps else ()
+    pictures = _maps(effort) if with_maps else ()
     lines, seconds = tuple(peer_lines().values()), time.monotonic() - begun_s
     result = BenchmarkResult(
         effort=effort.name, seconds=seconds, machine=machine(), peers=lines, studies=found,
@@ -42,8 +42,11 @@ def _tell(words: str) -> None:
     console.print(words, highlight=False)
 
 
-def _maps() -> tuple[MapPicture, ...]:
+def _maps(effort: Effort) -> tuple[MapPicture, ...]:
+    from acquisition.benchmark.corrections.picture import corrections_picture
     from acquisition.benchmark.maps.all_maps import draw_maps
 
     _tell("maps")
-    return tuple(draw_maps())
+    maps = tuple(draw_maps())
+    _tell("corrections on a bench with defects")
+    return (*maps, corrections_picture(effort.seeds))

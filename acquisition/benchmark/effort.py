@@ -11,7 +11,8 @@ class Effort:
 
     truths: geometries with a reference value of the reflectance. batch: geometries in one call.
     repeats: of each timing. frame_views: view angles of the window. starts: of a fit, over
-    `data_sets` noisy scans. seeds: simulated scans of each setting. draws: of a noisy reading.
+    `data_sets` noisy scans. seeds: simulated scans of each setting, and benches
+    on which each correction is tried. draws: of a noisy reading.
     thorough: all settings of the scan, not only the decisive ones.
     """
 

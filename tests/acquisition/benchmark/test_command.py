@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -29,17 +30,22 @@ def test_the_command_writes_all_files_with_maps(
     studies = result().studies
     monkeypatch.setattr("acquisition.benchmark.maps.all_maps.draw_maps", made_up_maps)
     monkeypatch.setattr(
+        "acquisition.benchmark.corrections.picture.corrections_picture",
+        lambda benches: replace(next(made_up_maps()), caption=f"{benches} benches"),
+    )
+    monkeypatch.setattr(
         "acquisition.benchmark.studies.all_studies.studies", lambda *_: iter(studies)
     )
     folder = tmp_path / "bench"
     run_benchmark(folder, quick=True, with_maps=True)
     assert {p.name for p in folder.iterdir()} == {
-        "bench.html", "bench.json", "main_chart.svg", "map_1.csv",
+        "bench.html", "bench.json", "main_chart.svg", "map_1.csv", "map_2.csv",
         *(f"{one.name}.csv" for one in studies),
     }  # fmt: skip
     assert (folder / "map_1.csv").read_text() == "theta_deg,fails\n10,no\n20,yes\n"
     written = (folder / "bench.html").read_text()
     assert "Where it fails" in written
+    assert "2 benches" in written
     assert "Read this.<br>And this." in written
     assert "<?xml" not in written
     assert from_json((folder / "bench.json").read_text()).effort == "quick"

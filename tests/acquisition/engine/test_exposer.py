@@ -56,7 +56,7 @@ def test_the_brightest_part_of_the_window_stays_within_the_target(record: Record
 def test_most_points_of_a_real_bench_need_no_second_exposure(
     record: Record, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """57 of 496 needed one in scans with 33 view angles; here they lie farther apart."""
+    """64 of 496 needed one in scans with 33 view angles; here they lie farther apart."""
     tried = frames_tried(monkeypatch)
     views = {
         "theta_i_deg": [30.0],

@@ -46,6 +46,7 @@ VIEWS_DEG = (-83.0, -78.0, -70.0, -62.0, -50.0, -35.0, -20.0, -5.0, 10.0, 25.0, 
 _U_TILE, _U_TILE_COMMON = 0.002, 0.005  # of each value of the table, and of all
 _SHRINK = 4
 _U_LINEARITY = 0.001  # left over by the calibration of the camera's response
+_CUT_OFF = 0.88  # standard deviation of drawn errors in units of their spread: none is beyond 2
 _RINGS = 4  # of the truth's average over lamp and lens
 
 
@@ -116,7 +117,7 @@ def _drawn_rig(rig: Rig, seed: int, lines: dict[str, Any]) -> Rig:
     ):
         for name in names:
             section[name] /= _SHRINK
-    stated = {"u_linearity": _U_LINEARITY}
+    stated = {"u_linearity": _CUT_OFF * _U_LINEARITY}
     if rig.uncertainty.u_pixel_response:
         stated["u_pixel_response"] = rig.uncertainty.u_pixel_response / _SHRINK
     known = rig.uncertainty.model_copy(update={**stated, **lines})
