@@ -91,10 +91,13 @@ class Run:
         """Standard uncertainty of the radiance (k = 1), (N,) in counts (DN) per second."""
         return self.reduced.u_radiance
 
-    @property
+    @cached_property
     def u_parts_relative(self) -> Mapping[str, FloatArray]:
-        """Standard uncertainties of the BRDF by cause, (N,) each, relative; without the angles."""
-        return self.reduced.parts
+        """Standard uncertainties of the BRDF by cause, (N,) each, relative, as in measurements.csv.
+
+        That of the angles takes the run's own fit: NaN for points that were not fitted.
+        """
+        return self._own_fit.parts(self.reduced)
 
     @property
     def shared(self) -> tuple[SharedError, ...]:

@@ -43,6 +43,11 @@ def stacks(data: ReportData, sweep: PlottedSweep) -> FloatArray:
     return np.concatenate([shown, rest]) if len(heights) > _MOST else shown
 
 
+def with_budget(data: ReportData, sweeps: Sequence[PlottedSweep]) -> tuple[PlottedSweep, ...]:
+    """Sweeps that have a point without flags whose uncertainty is known."""
+    return tuple(s for s in sweeps if np.any(stacks(data, s)[:, ~s.flagged]))
+
+
 def ranked_sources(data: ReportData) -> list[str]:
     """Names of the sources with a band of their own, the largest first, and of all others."""
     names = [list(data.sources)[n] for n in _order(data)]

@@ -12,10 +12,8 @@ import struct
 from collections.abc import Iterable
 from pathlib import Path
 
-import numpy as np
-
 from analysis.report import captions, charts
-from analysis.report.budget_chart import budget_chart, stacks
+from analysis.report.budget_chart import budget_chart, with_budget
 from analysis.report.data import Candidate, Parameter, ReportData, Rows
 from analysis.report.polar import polar_chart
 from analysis.report.style import CSS, escaped, format_value, html_page, short_number
@@ -227,10 +225,10 @@ def _budget(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
         _row((escaped(name), f"#{_percent(u)}", f"#{_number(share, '.0f')} %", _bar(share)))
         for name, u, share in data.budget
     )
-    drawn = ""
-    if any(np.any(stacks(data, sweep)) for sweep in sweeps):
-        label, caption = "uncertainty by source", captions.budget_caption(sweeps)
-        drawn = _figure([budget_chart(data, sweeps)], label, caption)
+    drawn, known = "", with_budget(data, sweeps)
+    if known:
+        label, caption = "uncertainty by source", captions.budget_caption(known)
+        drawn = _figure([budget_chart(data, known)], label, caption)
     return (
         '<h2 id="budget">Uncertainty budget</h2>\n'
         '<p class="soft">Standard uncertainty (k = 1) of a point, relative to its value.</p>\n'
