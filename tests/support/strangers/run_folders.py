@@ -72,10 +72,11 @@ def _write_schema(database: sqlite3.Connection, texts: list[tuple[str, str]]) ->
 
 
 def run_few_points(folder: Path) -> Path:
-    """Run the demo with few view angles; returns the run's folder, in `folder`."""
+    """Run the demo with few view angles and models; returns the run's folder, in `folder`."""
     text = (CONFIGS / "protocols" / "demo.yaml").read_text().replace("num: 33", "num: 5")
     protocol = folder / "few.yaml"
-    protocol.write_text(text.replace("../rigs/", f"{CONFIGS / 'rigs'}/"))
+    text = text.replace("../rigs/", f"{CONFIGS / 'rigs'}/")
+    protocol.write_text(f"{text}fit: {{models: [lambert, oren_nayar]}}\n")
     done = gonio("run", protocol, "--out", folder / "run")
     assert done.returncode == 0, done.stderr
     return folder / "run"

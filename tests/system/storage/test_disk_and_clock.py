@@ -152,11 +152,12 @@ def test_a_record_that_another_program_holds_is_waited_for_and_named(
 
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The demo with a coarse sweep and kept frames."""
+    """The demo with a coarse sweep, one model and kept frames."""
     folder = tmp_path_factory.mktemp("protocol")
     text = (CONFIGS / "protocols" / "demo.yaml").read_text()
     text = text.replace("num: 33", "num: 5").replace("frames_per_point: 4", "frames_per_point: 2")
-    text = text.replace("../rigs", str(CONFIGS / "rigs")) + "keep_frames: true\n"
+    text = text.replace("../rigs", str(CONFIGS / "rigs"))
+    text += "keep_frames: true\nfit: {models: [oren_nayar]}\n"
     (folder / "small.yaml").write_text(text)
     return folder / "small.yaml"
 
