@@ -11,6 +11,7 @@ from acquisition.commands.scan import report_run, resume_run
 from acquisition.results.sources import Wanted, read_source
 from instrument.errors import GonioError, InputError, NotDetermined
 from instrument.record.record import FILE_NAME
+from instrument.record.schema import SCHEMA_VERSION
 from tests.support.command import gonio_here as gonio
 from tests.support.strangers.run_folders import REFUSED, SCRIPT, Sent, copy_of, run_few_points
 
@@ -33,8 +34,12 @@ WAYS: dict[str, Callable[[Path], object]] = {
 }
 
 
-@pytest.mark.parametrize("version", [6, 5, 4, 3])
-@pytest.mark.parametrize("what", REFUSED)
+# `Record.open` refuses each in every version: see `test_validation`. The commands that call it need
+# no more than the newest, and one of the three older ones in turn.
+CASES = [(what, v) for n, what in enumerate(REFUSED) for v in (SCHEMA_VERSION, 3 + n % 3)]
+
+
+@pytest.mark.parametrize(("what", "version"), CASES)
 def test_every_command_refuses_a_record_that_no_scan_wrote(
     run: Path, tmp_path: Path, what: str, version: int
 ) -> None:
