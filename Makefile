@@ -6,9 +6,6 @@ BIN := $(VENV)/bin
 # Six workers need not each read the files that have no such test.
 WAITING = $(shell grep -rl --include='test_*.py' 'pytest\.mark\.waits' tests)
 
-# One more than there are processors: some of the other tests wait as well.
-WORKERS = $(shell expr $$(nproc) + 1)
-
 .PHONY: demo test hil-emulated lint waiting clean
 
 demo: $(VENV)/.installed
@@ -17,7 +14,7 @@ demo: $(VENV)/.installed
 # Tests that wait for emulated devices leave most of the processor to the linters, which yield it.
 test: $(VENV)/.installed-dev
 	$(MAKE) --no-print-directory -j 2 --output-sync=target lint waiting
-	$(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not hil and not waits"
+	$(BIN)/pytest -n auto --dist worksteal -m "not hil and not waits"
 
 waiting: $(VENV)/.installed-dev
 	$(BIN)/pytest -n 6 -m "waits and not hil" $(WAITING)
