@@ -16,11 +16,18 @@ from tests.support.strangers.mutations import Mutator, feed
 from tests.support.strangers.run_folders import REFUSED, Sent, copy_of
 
 
-@pytest.fixture(params=[6, 5, 4, 3])
-def sent(tmp_path: Path, request: pytest.FixtureRequest) -> Sent:
-    """A received small record, in each schema version."""
-    small_record(tmp_path / "run").close()
-    return copy_of(tmp_path / "run", tmp_path, request.param)
+@pytest.fixture(scope="module", params=[6, 5, 4, 3])
+def received(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
+    """Folder of a small record in each schema version."""
+    folder = tmp_path_factory.mktemp("received")
+    small_record(folder / "run").close()
+    return copy_of(folder / "run", folder, request.param).folder
+
+
+@pytest.fixture
+def sent(received: Path, tmp_path: Path) -> Sent:
+    """A copy of it, to be changed."""
+    return copy_of(received, tmp_path)
 
 
 def test_a_sound_record_of_each_version_opens(sent: Sent) -> None:

@@ -156,6 +156,7 @@ def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("protocol")
     text = (CONFIGS / "protocols" / "demo.yaml").read_text()
     text = text.replace("num: 33", "num: 5").replace("frames_per_point: 4", "frames_per_point: 2")
+    text = text.replace("[30.0, 45.0, 60.0]", "[30.0, 60.0]")
     text = text.replace("../rigs", str(CONFIGS / "rigs"))
     text += "keep_frames: true\nfit: {models: [oren_nayar]}\n"
     (folder / "small.yaml").write_text(text)
