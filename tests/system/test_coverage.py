@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from instrument.config.protocol import SimulatedSample
-from instrument.geometry import FloatArray
 from tests.support.whole_scans.coverage_scans import (
-    BANDS_DEG,
     Deviations,
+    by_band,
+    by_parameter,
     deviations,
     drawn_scan,
     measured,
@@ -31,24 +31,6 @@ def _deviations(rig: str, kind: str, albedo: float, draws: int, folder: Path) ->
     sample = SimulatedSample(model=model, parameters={**values, "albedo": albedo}, mottling=0.02)
     scans = [drawn_scan(rig, sample, number, draws) for number in range(draws)]
     return [deviations(measured(s, folder / str(n)), s.loaded) for n, s in enumerate(scans)]
-
-
-def _by_band(found: list[Deviations]) -> dict[str, FloatArray]:
-    """Deviations of all points of each band of view angle, in u, by the band's name."""
-    theta_r = np.abs(np.concatenate([d.theta_r_deg for d in found]))
-    points = np.concatenate([d.points for d in found])
-    return {
-        f"{low:g} to {high:g} deg": points[(low <= theta_r) & (theta_r < high)]
-        for low, high in BANDS_DEG
-    }
-
-
-def _by_parameter(found: list[Deviations]) -> dict[str, FloatArray]:
-    """Deviations of each fitted parameter, in u; scans in which it has no u are left out."""
-    return {
-        name: np.array([d.parameters[name] for d in found if name in d.parameters])
-        for name in found[0].parameters
-    }
 
 
 @pytest.mark.slow
@@ -72,7 +54,7 @@ def test_deviations_have_the_size_of_the_stated_uncertainty(
     draws = 60 if slow else 4
     found = _deviations(rig, kind, albedo, draws, tmp_path)
     wrong = []
-    for name, own in {**_by_band(found), **_by_parameter(found)}.items():
+    for name, own in {**by_band(found), **by_parameter(found)}.items():
         rms, covered = float(np.sqrt(np.mean(own**2))), float(np.mean(np.abs(own) < 1.96))
         record_property(name, f"rms {rms:.2f} u, within 1.96 u {covered:.0%}")
         if not abs(rms - 1) < 3 / np.sqrt(2 * draws):

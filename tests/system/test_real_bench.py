@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.whole_scans.coverage_scans import Deviations, by_band, by_parameter
 from tests.support.whole_scans.real_bench import (
-    Pulls,
-    by_band,
-    by_parameter,
     pulls_of,
     real_bench_run,
 )
@@ -21,7 +19,7 @@ _FEW = 2  # in a normal run
 _COVERED = 1.96
 
 
-def _pulls(folder: Path, runs: int, lines: dict[str, float] | None = None) -> list[Pulls]:
+def _pulls(folder: Path, runs: int, lines: dict[str, float] | None = None) -> list[Deviations]:
     loaded = (real_bench_run(number, folder, runs, lines=lines) for number in range(runs))
     return [pulls_of(one, folder / str(number)) for number, one in enumerate(loaded)]
 

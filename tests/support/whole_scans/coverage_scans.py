@@ -44,11 +44,12 @@ _ERRORS = 6  # black level, lamp drift, and the heights of up to four placements
 class Deviations:
     """Deviations of one scan: of points (N,) at theta_r_deg (N,), and of fitted parameters.
 
-    In units of the stated u; a parameter without u is left out.
+    In units of the stated u; a parameter without u is left out. relative: of the points, (N,).
     """
 
     theta_r_deg: FloatArray
     points: FloatArray
+    relative: FloatArray
     parameters: dict[str, float]
 
 
@@ -160,9 +161,29 @@ def deviations(m: Measurements, loaded: Loaded) -> Deviations:
     return Deviations(
         m.theta_r_deg,
         (m.brdf - truth) / full_covariance(m, true_model).u_total,
+        m.brdf / truth - 1,
         {
             name: (fitted.values[name] - sample.parameters[name]) / u
             for name, u in fitted.u.items()
             if u is not None
         },
     )
+
+
+def by_band(found: list[Deviations]) -> dict[str, FloatArray]:
+    """Deviations of all points of each band of view angle, in u, by the band's name."""
+    theta_r = np.abs(np.concatenate([one.theta_r_deg for one in found]))
+    points = np.concatenate([one.points for one in found])
+    return {
+        f"{low:g} to {high:g} deg": points[(low <= theta_r) & (theta_r < high)]
+        for low, high in BANDS_DEG
+    }
+
+
+def by_parameter(found: list[Deviations]) -> dict[str, FloatArray]:
+    """Deviations of fitted parameters, in u, by name over all samples."""
+    names = sorted({name for one in found for name in one.parameters})
+    return {
+        name: np.array([one.parameters[name] for one in found if name in one.parameters])
+        for name in names
+    }

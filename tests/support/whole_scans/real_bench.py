@@ -7,7 +7,6 @@ rows and columns, with the sizes of defects in pixels to match: a window's mean 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from statistics import NormalDist
 from typing import Any
@@ -16,19 +15,14 @@ import numpy as np
 
 from acquisition.results.fitting import measurements
 from acquisition.results.reduction import reduced_run
-from analysis.data.acceptance import Acceptance, averaged_brdf
-from analysis.data.covariance import full_covariance
-from analysis.fit.fit import fit
-from analysis.models import MODELS
 from instrument.config.load import Loaded, load_protocol
 from instrument.config.protocol import DriftCheck, References, SimulatedSample
 from instrument.config.rig import Rig, Simulation
-from instrument.geometry import FloatArray, Geometry
 from instrument.record.record import Record
 from tests.support.paths import CONFIGS
 from tests.support.scans import changed, shrunk
 from tests.support.white_tiles import table_text, tabled
-from tests.support.whole_scans.coverage_scans import BANDS_DEG
+from tests.support.whole_scans.coverage_scans import Deviations, deviations
 from tests.support.whole_scans.stopped_scan import scan
 
 SAMPLES = (
@@ -47,20 +41,6 @@ _U_TILE, _U_TILE_COMMON = 0.002, 0.005  # of each value of the table, and of all
 _SHRINK = 4
 _U_LINEARITY = 0.001  # left over by the calibration of the camera's response
 _CUT_OFF = 0.88  # standard deviation of drawn errors in units of their spread: none is beyond 2
-_RINGS = 4  # of the truth's average over lamp and lens
-
-
-@dataclass(frozen=True, slots=True)
-class Pulls:
-    """(value - truth) / u of one run: of points (N,), and of fitted parameters with a u.
-
-    theta_r_deg, relative: view angles (N,), and relative deviations (N,) of the points.
-    """
-
-    theta_r_deg: FloatArray
-    points: FloatArray
-    relative: FloatArray
-    parameters: dict[str, float]
 
 
 def real_bench_run(
@@ -125,47 +105,9 @@ def _drawn_rig(rig: Rig, seed: int, lines: dict[str, Any]) -> Rig:
     return rig.model_copy(update=update)
 
 
-def pulls_of(loaded: Loaded, folder: Path) -> Pulls:
+def pulls_of(loaded: Loaded, folder: Path) -> Deviations:
     """Scan, reduce, and fit the true model; compare with the truth."""
     with Record.create(folder, {}) as record:
         scan(loaded, record)
         m = measurements(reduced_run(record, loaded), loaded)
-    sample = loaded.protocol.simulated_sample
-    assert sample is not None
-
-    def true_model(geometry: Geometry) -> FloatArray:
-        return MODELS[sample.model].brdf(geometry, **sample.parameters)
-
-    acceptance = Acceptance.of(loaded.rig, loaded.protocol.window)
-    angles = (m.theta_i_deg, m.theta_r_deg, m.dphi_deg)
-    truth = averaged_brdf(true_model, *angles, acceptance, _RINGS)
-    fitted = fit(MODELS[sample.model], m, acceptance)
-    return Pulls(
-        m.theta_r_deg,
-        (m.brdf - truth) / full_covariance(m, true_model).u_total,
-        m.brdf / truth - 1,
-        {
-            name: (fitted.values[name] - sample.parameters[name]) / u
-            for name, u in fitted.u.items()
-            if u is not None
-        },
-    )
-
-
-def by_band(found: list[Pulls]) -> dict[str, FloatArray]:
-    """Deviations of all points of each band of view angle, in u, by the band's name."""
-    theta_r = np.abs(np.concatenate([one.theta_r_deg for one in found]))
-    points = np.concatenate([one.points for one in found])
-    return {
-        f"{low:g} to {high:g} deg": points[(low <= theta_r) & (theta_r < high)]
-        for low, high in BANDS_DEG
-    }
-
-
-def by_parameter(found: list[Pulls]) -> dict[str, FloatArray]:
-    """Deviations of fitted parameters, in u, by name over all samples."""
-    names = sorted({name for one in found for name in one.parameters})
-    return {
-        name: np.array([one.parameters[name] for one in found if name in one.parameters])
-        for name in names
-    }
+    return deviations(m, loaded)
