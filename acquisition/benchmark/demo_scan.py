@@ -6,14 +6,20 @@ lets a hundred scans take a minute.
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
+from acquisition.engine.engine import Engine
+from acquisition.plan.plan import make_plan
+from acquisition.results.reduction import Reduced, reduced_run
+from acquisition.rig import open_devices
 from instrument.config.load import Loaded, load_protocol, load_rig
-from instrument.config.protocol import Protocol, Steps
+from instrument.config.protocol import Protocol, SimulatedSample, Steps
 from instrument.config.rig import Rig
+from instrument.record.record import Record
 
 BINNING = 2
 """Pixels a side that are binned: 4 of them hold 4 times the electrons.
@@ -100,3 +106,19 @@ def _view_steps(protocol: Protocol) -> Steps:
     if not isinstance(steps, Steps):
         raise ValueError("demo.yaml: theta_r_deg is a list; allowed: start, stop and num")
     return steps
+
+
+def reduced_scan(loaded: Loaded, folder: Path) -> Reduced:
+    """Scan with the program's own engine into a new folder, and return the reduced points."""
+    with closing(open_devices(loaded)) as devices, Record.create(folder, {}) as record:
+        engine = Engine(loaded.protocol, loaded.rig, devices, record, lambda _: None)
+        engine.run(make_plan(loaded))
+        return reduced_run(record, loaded)
+
+
+def sample_of(loaded: Loaded) -> SimulatedSample:
+    """Return the simulated sample of a scan, which knows the truth."""
+    sample = loaded.protocol.simulated_sample
+    if sample is None:
+        raise ValueError(f"{loaded.protocol_path}: simulated_sample is missing; required here")
+    return sample

@@ -1,10 +1,13 @@
-"""Commands `gonio calibrate ...`: measure devices and write what was found. Only theta_r moves."""
+"""Commands `gonio calibrate ...`: measure devices and write what was found.
+
+Only that of the geometry moves the axes of a real rig.
+"""
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -67,7 +70,8 @@ def calibrate_camera(
     with orderly_end():
         calibration = _measured(plan)
         written = write_camera_file(path, calibration)
-    _print(written, rig, path, as_json)
+    found = summary_json(written, str(path))
+    _print(written, found, summary_lines(written, rig, out.width), path, as_json)
 
 
 def _require_somebody(rig: Rig, rig_path: Path | None) -> None:
@@ -109,17 +113,18 @@ def _say(text: str) -> None:
     console.print(text, highlight=False, soft_wrap=True)
 
 
-def _print(calibration: CameraCalibration, rig: Rig, path: Path, as_json: bool) -> None:
-    if as_json:
-        sys.stdout.write(json.dumps(summary_json(calibration, str(path))) + "\n")
-        return
-    print_lines(summary_lines(calibration, rig, out.width))
-    _print_end(calibration, path)
-
-
-def _print_end(
-    calibration: CameraCalibration | LampCalibration | GeometryCalibration, path: Path
+def _print(
+    calibration: CameraCalibration | LampCalibration | GeometryCalibration,
+    found: Mapping[str, object],
+    lines: Iterable[str],
+    path: Path,
+    as_json: bool,
 ) -> None:
+    """Print what was found as JSON, or its lines, the notes and the file."""
+    if as_json:
+        sys.stdout.write(json.dumps(found) + "\n")
+        return
+    print_lines(lines)
     print_notes(calibration.notes)
     print_lines([f"file: {path} (sha256 {calibration.sha256[:16]}...)"])
 
@@ -145,11 +150,8 @@ def calibrate_lamp(
     _require_somebody(rig, rig_path)
     with orderly_end():
         written = write_lamp_file(path, _watched(plan, rig_path or Path()))
-    if as_json:
-        sys.stdout.write(json.dumps(lamp_json(written, str(path))) + "\n")
-        return
-    print_lines(lamp_lines(written, rig, out.width))
-    _print_end(written, path)
+    found = lamp_json(written, str(path))
+    _print(written, found, lamp_lines(written, rig, out.width), path, as_json)
 
 
 def _watched(plan: LampPlan, rig_path: Path) -> LampCalibration:
@@ -201,11 +203,8 @@ def calibrate_geometry(
     _require_somebody(rig, rig_path)
     with orderly_end():
         written = write_geometry_file(path, _seen(plan, yes))
-    if as_json:
-        sys.stdout.write(json.dumps(geometry_json(written, str(path))) + "\n")
-        return
-    print_lines(geometry_lines(written, rig, path, out.width))
-    _print_end(written, path)
+    found = geometry_json(written, str(path))
+    _print(written, found, geometry_lines(written, rig, path, out.width), path, as_json)
 
 
 def _seen(plan: GeometryPlan, yes: bool) -> GeometryCalibration:

@@ -90,6 +90,24 @@ class Archive:
             )
         return header, arrays, digest
 
+    def copy_text(self, calibration: Any) -> str:
+        """Return all of a calibration but its arrays as the text that a run keeps: `read_copy`."""
+        header = {**self.header(own_header(calibration)), "sha256": calibration.sha256}
+        return json.dumps(header, indent=1, ensure_ascii=False) + "\n"
+
+    def read_copy(self, path: Path) -> tuple[dict[str, Any], str]:
+        """Return header and hash from the copy that a run keeps; raise `InputError`.
+
+        Who wrote it, the run, proves it by a hash of its own.
+        """
+        try:
+            header = json.loads(bytes_of(path))
+            return header, header.pop("sha256")
+        except (ValueError, KeyError, AttributeError, TypeError) as error:
+            raise InputError(
+                f"{path}: is no copy of a {self.kind} calibration ({error})"
+            ) from error
+
 
 def own_header(calibration: Any) -> dict[str, Any]:
     """Return all of a calibration, a dataclass, but its arrays and hash."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from instrument.calibration.archive import Archive, bytes_of, own_header, without_format
+from instrument.calibration.archive import Archive, own_header, without_format
 from instrument.calibration.camera_calibration import LEVEL_COLUMNS, MAPS, CameraCalibration
 from instrument.calibration.quantity import Quantity
 from instrument.calibration.response_curve import ResponseCurve
@@ -37,21 +36,12 @@ def read_camera_file(path: Path) -> CameraCalibration:
 
 def header_text(calibration: CameraCalibration) -> str:
     """Return all but the arrays as the text that a run keeps: see `read_camera_header`."""
-    header = {**_ARCHIVE.header(own_header(calibration)), "sha256": calibration.sha256}
-    return json.dumps(header, indent=1, ensure_ascii=False) + "\n"
+    return _ARCHIVE.copy_text(calibration)
 
 
 def read_camera_header(path: Path) -> CameraCalibration:
-    """Read the copy that a run keeps of a calibration, without arrays; raise `InputError`.
-
-    Who wrote it, the run, proves it by a hash of its own.
-    """
-    try:
-        header = json.loads(bytes_of(path))
-        digest = header.pop("sha256")
-    except (ValueError, KeyError, AttributeError, TypeError) as error:
-        raise InputError(f"{path}: is no copy of a camera calibration ({error})") from error
-    return _calibration(path, header, digest)
+    """Read the copy that a run keeps of a calibration, without arrays; raise `InputError`."""
+    return _calibration(path, *_ARCHIVE.read_copy(path))
 
 
 def _packed(arrays: dict[str, FloatArray]) -> dict[str, Any]:

@@ -5,7 +5,6 @@ Its array `corners` has one row for each corner of the board in each picture (`C
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from instrument.calibration.archive import Archive, bytes_of, own_header, without_format
+from instrument.calibration.archive import Archive, own_header, without_format
 from instrument.calibration.quantity import Quantity
 from instrument.calibration.same_device import require_recent, require_same_camera
 from instrument.errors import InputError
@@ -99,21 +98,12 @@ def read_geometry_file(path: Path) -> GeometryCalibration:
 
 def geometry_text(calibration: GeometryCalibration) -> str:
     """Return all but the arrays as the text that a run keeps: see `read_geometry_text`."""
-    header = {**_ARCHIVE.header(own_header(calibration)), "sha256": calibration.sha256}
-    return json.dumps(header, indent=1, ensure_ascii=False) + "\n"
+    return _ARCHIVE.copy_text(calibration)
 
 
 def read_geometry_text(path: Path) -> GeometryCalibration:
-    """Read the copy that a run keeps of a calibration, without arrays; raise `InputError`.
-
-    Who wrote it, the run, proves it by a hash of its own.
-    """
-    try:
-        header = json.loads(bytes_of(path))
-        digest = header.pop("sha256")
-    except (ValueError, KeyError, AttributeError, TypeError) as error:
-        raise InputError(f"{path}: is no copy of a geometry calibration ({error})") from error
-    return _calibration(path, header, digest)
+    """Read the copy that a run keeps of a calibration, without arrays; raise `InputError`."""
+    return _calibration(path, *_ARCHIVE.read_copy(path))
 
 
 def _calibration(path: Path, header: dict[str, Any], digest: str) -> GeometryCalibration:

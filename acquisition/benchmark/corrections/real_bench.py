@@ -74,19 +74,27 @@ def real_bench(seed: int, corrections: Corrections) -> Loaded:
     )
 
 
-def _rig(rig: Rig, seed: int, corrections: Corrections) -> Rig:
+def drawn_defects(rig: Rig, seed: int, times: int) -> dict[str, Any]:
+    """Return the rig's section `simulation`, to be drawn from a seed.
+
+    Defects are those of pixels with `times` the sides.
+    """
     own = rig.simulation.model_dump() | {"seed": seed, "drawn": True}
-    own["camera_defects"]["prnu"] /= BINNING
-    lens, axis = own["lens_defects"], own["axis_defects"]["theta_r"]
+    own["camera_defects"]["prnu"] /= times
     for section, names in (
-        (lens, ("axis_column_px", "axis_row_px", "defocus_px")),
-        (axis, ("sag_px", "wobble_px")),
+        (own["lens_defects"], ("axis_column_px", "axis_row_px", "defocus_px")),
+        (own["axis_defects"]["theta_r"], ("sag_px", "wobble_px")),
     ):
-        section |= {name: section[name] / BINNING for name in names}
+        section |= {name: section[name] / times for name in names}
+    return own
+
+
+def _rig(rig: Rig, seed: int, corrections: Corrections) -> Rig:
+    own = drawn_defects(rig, seed, BINNING)
     if corrections.response:
         own["camera_defects"]["nonlinearity"] = _CALIBRATED_NONLINEARITY
     if corrections.zero:
-        axis["zero_deg"] = _CALIBRATED_ZERO_DEG
+        own["axis_defects"]["theta_r"]["zero_deg"] = _CALIBRATED_ZERO_DEG
     lines = dict(corrections.lines)
     camera = rig.camera
     if corrections.dark_patch:

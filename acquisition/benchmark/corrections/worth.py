@@ -7,7 +7,6 @@ truth is the sample's BRDF at the geometry that was asked for, averaged over lam
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,15 +14,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from acquisition.benchmark.corrections.real_bench import Corrections, real_bench
-from acquisition.engine.engine import Engine
-from acquisition.plan.plan import make_plan
-from acquisition.results.reduction import reduced_run
-from acquisition.rig import open_devices
+from acquisition.benchmark.demo_scan import reduced_scan, sample_of
 from analysis.data.acceptance import Acceptance, averaged_brdf
 from analysis.models import MODELS
 from instrument.config.load import Loaded
 from instrument.geometry import BoolArray, FloatArray, Geometry
-from instrument.record.record import Record
 
 BANDS_DEG = ((0.0, 60.0), (60.0, 75.0), (75.0, 85.0))
 """Ranges of |theta_r| that are told apart."""
@@ -88,13 +83,7 @@ def worth(corrections: Corrections, benches: int) -> Worth:
 def _errors(scans: Iterator[Loaded], folder: Path) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Yield the view angles and relative errors of the points of each scan."""
     for number, loaded in enumerate(scans):
-        with (
-            closing(open_devices(loaded)) as devices,
-            Record.create(folder / str(number), {}) as record,
-        ):
-            engine = Engine(loaded.protocol, loaded.rig, devices, record, lambda _: None)
-            engine.run(make_plan(loaded))
-            reduced = reduced_run(record, loaded)
+        reduced = reduced_scan(loaded, folder / str(number))
         theta_i, theta_r, dphi = np.array(
             [(p.theta_i_deg, p.theta_r_deg, p.dphi_deg) for p in reduced.points]
         ).T
@@ -104,9 +93,7 @@ def _errors(scans: Iterator[Loaded], folder: Path) -> Iterator[tuple[FloatArray,
 
 def _truth(loaded: Loaded, angles_deg: tuple[FloatArray, FloatArray, FloatArray]) -> FloatArray:
     """True BRDF of the sample at angles (N,) each, in 1/sr."""
-    sample = loaded.protocol.simulated_sample
-    if sample is None:
-        raise ValueError(f"{loaded.protocol_path}: simulated_sample is missing; required here")
+    sample = sample_of(loaded)
     model, parameters = MODELS[sample.model], sample.parameters
 
     def brdf(geometry: Geometry) -> FloatArray:

@@ -9,36 +9,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from acquisition.benchmark.demo_scan import BINNING, demonstration, view_step_deg
+from acquisition.benchmark.demo_scan import (
+    BINNING,
+    demonstration,
+    reduced_scan,
+    sample_of,
+    view_step_deg,
+)
 from acquisition.benchmark.effort import Effort
 from acquisition.benchmark.number_text import percent, rounded
 from acquisition.benchmark.studies.method import rms_and_median
 from acquisition.benchmark.study import Study
 from acquisition.benchmark.trial import Trial, select
-from acquisition.engine.engine import Engine
 from acquisition.measure.window import window_at
 from acquisition.plan.exposure_ladder import longest_exposure_s
 from acquisition.plan.plan import Plan, make_plan
 from acquisition.results.fitting import measurements
-from acquisition.results.reduction import reduced_run
-from acquisition.rig import open_devices
 from analysis.data.acceptance import Acceptance
 from analysis.data.covariance import Covariance
 from analysis.fit.fit import fit, stated_u
 from analysis.fit.search.problem import Problem
 from analysis.models import MODELS
 from instrument.config.load import Loaded
-from instrument.config.protocol import SimulatedSample
 from instrument.geometry import FloatArray, Geometry
 from instrument.pinhole import Pinhole
-from instrument.record.record import Record
 
 _OWN, _PHOTONS, _STATED = "demonstration", "photons", "u_stated_relative"
 _WORDS = {"sigma_deg": "roughness σ", "albedo": "albedo"}
@@ -142,27 +142,16 @@ def simulated(settings: Settings, seeds: int, folder: Path) -> tuple[FloatArray,
     for seed in range(1, seeds + 1):
         loaded = demonstration(**asdict(settings), seed=seed)
         values, u = _once(loaded, folder / str(seed))
-        truth = _sample(loaded).parameters
+        truth = sample_of(loaded).parameters
         errors.append([values[name] / truth[name] - 1 for name in _WORDS])
         stated.append([u[name] / truth[name] for name in _WORDS])
     return np.array(errors), np.array(stated)
 
 
-def _sample(loaded: Loaded) -> SimulatedSample:
-    sample = loaded.protocol.simulated_sample
-    if sample is None:
-        raise ValueError(f"{loaded.protocol_path}: simulated_sample is missing; required here")
-    return sample
-
-
 def _once(loaded: Loaded, folder: Path) -> tuple[dict[str, float], dict[str, float]]:
     """Return parameters and their u from one simulated scan by the program's own engine."""
-    with closing(open_devices(loaded)) as devices, Record.create(folder, {}) as record:
-        engine = Engine(loaded.protocol, loaded.rig, devices, record, lambda _: None)
-        engine.run(make_plan(loaded))
-        reduced = reduced_run(record, loaded)
-    points = measurements(reduced, loaded)
-    model = MODELS[_sample(loaded).model]
+    points = measurements(reduced_scan(loaded, folder), loaded)
+    model = MODELS[sample_of(loaded).model]
     found = fit(model, points, Acceptance.of(loaded.rig, loaded.protocol.window))
     return dict(found.values), stated_u(found, points)
 
@@ -173,7 +162,7 @@ def photon_limit(loaded: Loaded, plan: Plan) -> dict[str, float]:
     The inverse of the Fisher information J^T C^-1 J, with J the derivatives of the model and C the
     variance of the electrons that the plan's exposures collect in the window.
     """
-    model, truth = MODELS[_sample(loaded).model], _sample(loaded).parameters
+    model, truth = MODELS[sample_of(loaded).model], sample_of(loaded).parameters
     poses = [step.pose for step in plan.points]
     geometry = Geometry.from_degrees(
         theta_i=[p.theta_i for p in poses],
@@ -209,7 +198,7 @@ def _trials(
 ) -> list[Trial]:
     loaded = demonstration(**asdict(settings))
     plan = make_plan(loaded)
-    truth, photons = _sample(loaded).parameters, photon_limit(loaded, plan)
+    truth, photons = sample_of(loaded).parameters, photon_limit(loaded, plan)
     trials: list[Trial] = []
     for column, (name, scene) in enumerate(_WORDS.items()):
         own_errors, stated = errors[:, column], float(np.median(stated_u[:, column]))

@@ -17,15 +17,14 @@ _POINTS = 3  # in the window, per side, over which stray light is averaged
 def lens_effects(readings: Readings) -> Iterator[Effect]:
     """Yield the effects whose size or u the rig file states."""
     lines = readings.rig.uncertainty
-    if lines.vignetting or lines.u_vignetting:
-        size, u = lines.vignetting, lines.u_vignetting
-        yield Effect(name=VIGNETTING, by_one=_vignetting(readings), size=size, u=u)
-    if lines.stray_light or lines.u_stray_light:
-        size, u = lines.stray_light, lines.u_stray_light
-        yield Effect(name=STRAY, by_one=_stray(readings), size=size, u=u)
-    if lines.wall_light or lines.u_wall_light:
-        size, u = lines.wall_light, lines.u_wall_light
-        yield Effect(name=WALLS, by_one=_walls(readings), size=size, u=u)
+    for key, name, by_one in (
+        ("vignetting", VIGNETTING, _vignetting),
+        ("stray_light", STRAY, _stray),
+        ("wall_light", WALLS, _walls),
+    ):
+        size, u = getattr(lines, key), getattr(lines, f"u_{key}")
+        if size or u:
+            yield Effect(name=name, by_one=by_one(readings), size=size, u=u)
 
 
 def _cos_view(readings: Readings, *, tile: bool) -> FloatArray:

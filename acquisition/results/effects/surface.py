@@ -8,6 +8,7 @@ much too wide on one side as it is too narrow on the other.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -40,15 +41,10 @@ def surface_effects(readings: Readings) -> Iterator[Effect]:
         if lines.tile_aged or lines.u_tile_aged:
             size, u = lines.tile_aged, lines.u_tile_aged
             yield Effect(name=TILE_AGED, by_one=none + 1, size=size, u=u)
-    if lines.u_zero_theta_i_deg:
-        name, u = ZEROS["theta_i"], lines.u_zero_theta_i_deg
-        yield Effect(name=name, by_one=none, u=u, theta_i_deg=none + 1)
-    if lines.u_zero_dphi_deg:
-        name, u = ZEROS["dphi"], lines.u_zero_dphi_deg
-        yield Effect(name=name, by_one=none, u=u, dphi_deg=none + 1)
-    if lines.u_zero_theta_r_deg:
-        name, u = ZEROS["theta_r"], lines.u_zero_theta_r_deg
-        yield Effect(name=name, by_one=none, u=u, theta_r_deg=none + 1)
+    for axis, name in ZEROS.items():
+        if u := getattr(lines, f"u_zero_{axis}_deg"):
+            turned: dict[str, Any] = {f"{axis}_deg": none + 1}
+            yield Effect(name=name, by_one=none, u=u, **turned)
 
 
 def _irradiance(readings: Readings) -> tuple[FloatArray, FloatArray]:

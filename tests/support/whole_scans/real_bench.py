@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from acquisition.benchmark.corrections.real_bench import drawn_defects
 from acquisition.results.fitting import measurements
 from acquisition.results.reduction import reduced_run
 from instrument.config.load import Loaded, load_protocol
@@ -87,16 +88,8 @@ def real_bench_run(
 
 def _drawn_rig(rig: Rig, seed: int, lines: dict[str, Any]) -> Rig:
     """The rig with its defects drawn, for pictures of fewer pixels, and a calibrated camera."""
-    own = rig.simulation.model_dump()
-    own |= {"seed": seed, "drawn": True}
-    own["camera_defects"]["prnu"] /= _SHRINK
+    own = drawn_defects(rig, seed, _SHRINK)
     own["camera_defects"]["nonlinearity"] = _U_LINEARITY
-    for section, names in (
-        (own["lens_defects"], ("axis_column_px", "axis_row_px", "defocus_px")),
-        (own["axis_defects"]["theta_r"], ("sag_px", "wobble_px")),
-    ):
-        for name in names:
-            section[name] /= _SHRINK
     stated = {"u_linearity": _CUT_OFF * _U_LINEARITY}
     if rig.uncertainty.u_pixel_response:
         stated["u_pixel_response"] = rig.uncertainty.u_pixel_response / _SHRINK
