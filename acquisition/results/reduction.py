@@ -24,7 +24,7 @@ from acquisition.measure.white_tile import Standard, standard
 from acquisition.results.effects.effect import Readings
 from acquisition.results.effects.lamp_level import drift_between, drift_noise, wander
 from acquisition.results.effects.lens import STRAY
-from acquisition.results.effects.rig_effects import has_effects, rig_effects, tiles_of
+from acquisition.results.effects.rig_effects import has_effects, rig_effects
 from analysis.data.measurements import SharedError
 from analysis.fit.certificate import CERTIFICATE
 from instrument.config.load import Loaded
@@ -142,10 +142,11 @@ def reduced_run(record: Record, loaded: Loaded) -> Reduced:
 def with_rig_effects(reduced: Reduced, readings: Sequence[Reading], loaded: Loaded) -> Reduced:
     """Return the run with the effects that its rig file states: corrected, and their u added."""
     theta_i = np.radians([p.theta_i_deg for p in reduced.points])
+    tiles = _tile_readings(readings)
     found = rig_effects(
         Readings(
             points=reduced.points,
-            tiles=tiles_of(reduced.points, readings),
+            tiles=[tiles.get(p.lamp_setting) for p in reduced.points],
             value=reduced.brdf if reduced.has_brdf else reduced.radiance / np.cos(theta_i),
             absolute=reduced.has_brdf,
             rig=loaded.rig,

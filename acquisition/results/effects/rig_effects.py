@@ -7,7 +7,7 @@ scan, as those of the simulated bench are.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +27,6 @@ from acquisition.results.effects.surface import (
 from analysis.data.measurements import SharedError
 from instrument.config.uncertainty.rig_lines import RigLines
 from instrument.geometry import FloatArray
-from instrument.record.reading import Reading
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,9 +101,3 @@ def _shared(effects: Iterable[Effect]) -> Iterable[SharedError]:
                 np.asarray(effect.theta_r_deg) * effect.u,
                 np.asarray(effect.dphi_deg) * effect.u,
             )
-
-
-def tiles_of(points: Sequence[Reading], readings: Iterable[Reading]) -> list[Reading | None]:
-    """Return for each point the first reading of the white tile at its setting of the lamp."""
-    first = {r.lamp_setting: r for r in sorted(readings, key=lambda r: -r.step) if r.kind == "tile"}
-    return [first.get(p.lamp_setting) for p in points]
