@@ -140,8 +140,12 @@ def test_unknown_models_are_named() -> None:
 
 
 CURET = ROOT.parent / "shared" / "data" / "curet"
+needs_curet = pytest.mark.skipif(
+    not CURET.is_dir(), reason="the CUReT tables are not in ../shared/data"
+)
 
 
+@needs_curet
 def test_the_reason_for_a_real_material_mentions_the_estimated_noise() -> None:
     chosen = choose(read_curet(CURET, 49, 68.8).measurements)
     assert chosen.verdict == "adequate"
@@ -149,6 +153,7 @@ def test_the_reason_for_a_real_material_mentions_the_estimated_noise() -> None:
     assert max(len(c.values) for c in chosen.candidates) == 5
 
 
+@needs_curet
 @pytest.mark.slow
 def test_the_automatic_choice_over_the_materials(slow: bool) -> None:
     """All 61 materials with `pytest --slow`; else one with a small misfit, 28."""
@@ -159,6 +164,7 @@ def test_the_automatic_choice_over_the_materials(slow: bool) -> None:
     assert np.median(rms) <= (0.055 if slow else 0.03)
 
 
+@needs_curet
 @pytest.mark.slow
 def test_no_material_gets_a_model_far_worse_than_another_candidate(slow: bool) -> None:
     """CUReT's samples 5 and 59 had a chosen rms over 20 % above that of the best candidate."""
