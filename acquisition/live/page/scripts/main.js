@@ -1,0 +1,68 @@
+// The live page: messages of the server go into the scan, panels show it. Start reading here.
+
+import { Chart } from './chart/chart.js';
+import { curvesOf } from './chart/curves.js';
+import { Legend } from './chart/legend.js';
+import { by } from './dom.js';
+import { listen } from './keyboard.js';
+import { Actions } from './panels/actions.js';
+import { showAim } from './panels/aim.js';
+import { showAttention } from './panels/attention.js';
+import { showEvents } from './panels/events.js';
+import { showLevels } from './panels/levels.js';
+import { Picture } from './panels/picture.js';
+import { showRig } from './panels/rig.js';
+import { showSelected } from './panels/selected.js';
+import { showConnection, showState } from './panels/state.js';
+import { Scan } from './scan.js';
+import { Selection } from './selection.js';
+import { follow } from './stream.js';
+import { useTheme } from './theme.js';
+
+const TOGETHER_MS = 40; // messages that arrive within this time are shown at once
+
+const scan = new Scan();
+const selection = new Selection(showAll);
+const actions = new Actions(scan);
+const picture = new Picture();
+const legend = new Legend(showAll);
+const curves = () => legend.visible(curvesOf(scan));
+const chart = new Chart(by('chart'), (step) => selection.select(step));
+let waiting = null;
+
+function showSoon() {
+  waiting ??= setTimeout(() => {
+    waiting = null;
+    showAll();
+  }, TOGETHER_MS);
+}
+
+function showAll() {
+  document.body.classList.toggle('aiming', scan.aiming);
+  const point = selection.pointIn(scan);
+  showState(scan);
+  actions.show();
+  showAttention(scan, selection);
+  showSelected(scan, point);
+  picture.show(scan);
+  showLevels(scan);
+  showAim(scan);
+  showRig(scan);
+  showEvents(scan);
+  legend.show(scan);
+  if (!scan.aiming) chart.show(scan, curves(), point);
+}
+
+function connection(state) {
+  actions.connected = state === 'open';
+  showConnection(state, scan);
+  showSoon();
+}
+
+by('unselect').addEventListener('click', () => selection.select(null));
+listen(curves, selection, () => actions.pauseOrResume());
+useTheme(showAll);
+follow((kind, data) => {
+  scan.take(kind, data);
+  showSoon();
+}, connection);

@@ -1,0 +1,25 @@
+// The rig: position of each axis, and the lamp.
+
+import { by, fill, make } from '../dom.js';
+import { degrees } from '../format.js';
+
+const LAMP = { lit: '● lit', darkened: '○ darkened', unknown: '? not known' };
+
+export function showRig({ rig }) {
+  if (!rig) return;
+  const rows = rig.axes.map((axis) => [axis.label, degrees(axis.deg), stateOf(axis)]);
+  fill(by('axes'), [...rows, ['Lamp', LAMP[rig.lamp] ?? rig.lamp, '']], (all) => all.map(row));
+}
+
+function stateOf({ moving, by_hand: byHand }) {
+  if (moving) return byHand ? 'is being set by hand' : 'moving';
+  return byHand ? 'set by hand' : '';
+}
+
+function row([name, value, state]) {
+  const cells = [
+    make('td', { className: 'number' }, value),
+    make('td', { className: 'soft' }, state),
+  ];
+  return make('tr', {}, make('th', { scope: 'row' }, name), ...cells);
+}

@@ -1,0 +1,60 @@
+// The selected reading: its frame, values, counts, exposure and flags.
+
+import { flagSwatch } from '../chart/symbols.js';
+import { by, fill, make, show, write } from '../dom.js';
+import { degrees, exposure, number, percent, timeOfDay, withU } from '../format.js';
+import { frameAddress } from '../requests.js';
+import { flagInWords, place } from '../words.js';
+
+export function showSelected(scan, point) {
+  show('selected', point !== null);
+  if (!point) return;
+  write('selected-title', `Selected: ${place(point)}`);
+  fill(by('selected-flags'), { flags: point.flags, step: point.step }, () =>
+    point.flags.map((flag) => flagRow(flag, point)),
+  );
+  fill(by('selected-facts'), facts(scan.run, point), (rows) => rows.flatMap(factRow));
+  showFrame(point);
+}
+
+function flagRow(flag, point) {
+  return make(
+    'li',
+    { className: 'flagged' },
+    flagSwatch(),
+    `${flagInWords(flag, point)} Not fitted.`,
+  );
+}
+
+const factRow = ([name, value]) => [make('dt', {}, name), make('dd', {}, value)];
+
+function facts(run, point) {
+  const mean = `${number(point.signal_dn)} DN (${percent(point.signal_dn / point.full_scale_dn)} of full scale)`;
+  const peak = `${number(point.peak_dn)} of ${point.full_scale_dn} DN (${percent(point.peak_dn / point.full_scale_dn)})`;
+  return [
+    [run?.quantity ?? 'Value', withU(point.value, point.u, run?.unit ?? '')],
+    ['Mean, dark subtracted', mean],
+    ['Brightest pixel', peak],
+    ['Saturated pixels', String(point.saturated_pixels)],
+    ['Exposure', `${exposure(point.exposure_s)}, ${point.frames} frames`],
+    ['Window', `${number(point.window_pixels)} pixels`],
+    ['Azimuth Δφ', degrees(point.dphi_deg)],
+    ['Time', timeOfDay(point.time_utc)],
+    ['Step of the plan', String(point.step)],
+  ];
+}
+
+function showFrame(point) {
+  const image = by('selected-frame');
+  show('selected-frame', point.has_frame);
+  write(
+    'selected-caption',
+    point.has_frame
+      ? `Frame of this reading, ${place(point)}`
+      : 'No frame of this reading was kept.',
+  );
+  const source = point.has_frame ? frameAddress(point.step) : '';
+  if (!source || image.getAttribute('src') === source) return;
+  image.src = source;
+  image.alt = `Frame of ${place(point)}`;
+}

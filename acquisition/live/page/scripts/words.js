@@ -1,0 +1,62 @@
+// States, flags and places in words.
+
+import { count, degrees, number, percent } from './format.js';
+
+// Name, and colour class: good, wait (somebody has to do something or wait), bad.
+export const STATES = {
+  measuring: ['Measuring', 'good'],
+  pausing: ['Pausing', 'wait'],
+  paused: ['Paused', 'wait'],
+  operator: ['Waiting for the operator', 'wait'],
+  ending: ['Ending', 'wait'],
+  finished: ['Finished', 'good'],
+  stopped: ['Stopped by the operator', 'wait'],
+  failed: ['Ended by a fault', 'bad'],
+  lost: ['The scan no longer answers', 'bad'],
+  aiming: ['Aiming', 'good'],
+};
+
+export const ENDED = ['finished', 'stopped', 'failed', 'lost'];
+
+// Each flag of a reading: what was seen, and what to look at. Others are shown as they are.
+const FLAGS = {
+  saturated: (p) => `${saturated(p)}. Lower exposure_target, or look for a mirror-like reflection.`,
+  'window leaves frame': () => 'the measured window leaves the picture. Look at the camera’s aim.',
+  'too few pixels': (p) => `the window covers only ${number(p.window_pixels, 3)} pixels.`,
+  'hot pixels': () => 'hot pixels cover too much of the window.',
+  'dead pixels': () => 'dead pixels cover too much of the window.',
+  'no signal': () => 'no light was measured. Look at the lamp and its shutter.',
+  'no brdf': () => 'no BRDF can be given.',
+  'no white tile yet': () => 'the white tile that its BRDF needs has not been measured yet.',
+  'dark patch leaves frame': () =>
+    'the dark patch, which measures stray light, leaves the picture.',
+  'dark patch is bright': () => 'the dark patch, which measures stray light, is lit.',
+  'frames differ': () => 'its frames differ by more than their noise. Look for flicker or motion.',
+  'not at its place in the next picture': () =>
+    'the next picture shows the sample elsewhere. Look at the stage.',
+  'lamp failed at the next reference': () => 'the lamp failed before the next reference.',
+  interlock: () => 'an interlock ended the scan here.',
+};
+
+function saturated(point) {
+  const peak = `${number(point.peak_dn)} of ${point.full_scale_dn} DN`;
+  if (point.saturated_pixels > 0) {
+    return `${count(point.saturated_pixels, 'pixel')} at full scale (peak ${peak}): the true value is higher`;
+  }
+  const share = percent(point.peak_dn / point.full_scale_dn);
+  return `its brightest pixel has ${peak} (${share}), too near full scale to be trusted`;
+}
+
+export function flagInWords(flag, point) {
+  const words = FLAGS[flag]?.(point);
+  return words ? `${flag}: ${words}` : `${flag}.`;
+}
+
+const SURFACES = { tile: 'White tile', drift: 'Drift check' };
+
+export function place(point) {
+  const angles = `θᵢ ${degrees(point.theta_i_deg)}, θᵣ ${degrees(point.theta_r_deg)}`;
+  const azimuth = point.dphi_deg ? `, Δφ ${degrees(point.dphi_deg)}` : '';
+  const surface = SURFACES[point.kind];
+  return (surface ? `${surface}, ` : '') + angles + azimuth;
+}
