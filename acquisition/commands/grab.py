@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.commands.setup import require_rig
-from acquisition.engine.exposure_search import ExposureSearch
+from acquisition.engine.exposure.search import ExposureSearch
 from acquisition.measure.window import Window, window_at
 from acquisition.plan.exposure_ladder import longest_exposure_s
 from acquisition.results.model_check import check_model

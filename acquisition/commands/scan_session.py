@@ -25,7 +25,7 @@ _TO_BE_SEEN = (
     "instrument.record",
     "acquisition.interlocks",
     "acquisition.engine.retrying_camera",
-    "acquisition.engine.exposure_check",
+    "acquisition.engine.exposure.check",
     "acquisition.engine.resume",
 )
 _LAST_WRITES_S = 5.0  # for a disk that hangs, or another program that holds the record

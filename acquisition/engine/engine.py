@@ -9,14 +9,16 @@ only the operator may resume the scan.
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 from acquisition.engine.axis import Axis
-from acquisition.engine.exposer import Exposed, Exposer
+from acquisition.engine.exposure.exposer import Exposed, Exposer
 from acquisition.engine.frame_files import write_frames
+from acquisition.engine.frame_reduction import FrameReduction
+from acquisition.engine.onlookers import KnownLamp, Phase, Present
+from acquisition.engine.pause import Paused, PauseSwitch
 from acquisition.engine.positioner import Positioner
 from acquisition.engine.preview import make_preview
 from acquisition.engine.resume import Progress, report_found
@@ -26,19 +28,14 @@ from acquisition.interlocks.lamp_checks import check_text, failed
 from acquisition.interlocks.references import References, what_to_look_at
 from acquisition.interlocks.watched_camera import WatchedCamera
 from acquisition.measure.drift import is_usable
-from acquisition.measure.placement import Placement
-from acquisition.measure.radiometry import Signal, measure
-from acquisition.measure.stray_light import View, with_dark_patch
-from acquisition.measure.window import Window, window_at
+from acquisition.measure.window import Window
 from acquisition.plan.moves import NoPathError
 from acquisition.plan.plan import Plan, Step
-from acquisition.plan.pose import Pose
 from instrument.clock import Clock
 from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
 from instrument.devices import Camera, Lamp, Operator, Surface
 from instrument.errors import DeviceError, Interlock, WrongRigFile
-from instrument.pinhole import Pinhole
 from instrument.record.event_kinds import DRIFT, INTERLOCK, OPERATOR
 from instrument.record.reading import Reading
 from instrument.record.record import Record
@@ -66,7 +63,11 @@ class Devices:
 
 
 class Engine:
-    """Runs the steps of a plan; `on_step` is called with each step once it is on disk."""
+    """Runs the steps of a plan.
+
+    `on_step` is called with each step once it is on disk, `on_frames` with its frames as soon as
+    they are there. `pause`: switch with which the operator pauses the scan.
+    """
 
     def __init__(
         self,
@@ -75,21 +76,28 @@ class Engine:
         devices: Devices,
         record: Record,
         on_step: Callable[[Step], None],
+        *,
+        on_frames: Callable[[Exposed, Window], None] = lambda *_: None,
+        pause: PauseSwitch | None = None,
     ) -> None:
         self._protocol, self._rig, self._devices = protocol, rig, devices
-        self._record, self._on_step = record, on_step
-        self._pinhole = Pinhole.of(rig)
+        self._record, self._on_step, self._on_frames = record, on_step, on_frames
+        self._pause = pause or PauseSwitch()
+        self._phase: Phase = "homing"
+        self._step: Step | None = None
+        self._lamp = KnownLamp(devices.lamp)
         self._ended = False
         self._references = References(rig, protocol.references.white_tile)
         note = partial(self._add_event, OPERATOR)
-        self._positioner = Positioner(rig, devices.axes, devices.lamp, devices.operator, note)
-        self._scatter = FrameScatter(rig, partial(self._add_event, INTERLOCK))
+        self._positioner = Positioner(rig, devices.axes, self._lamp, devices.operator, note)
+        scatter = FrameScatter(rig, partial(self._add_event, INTERLOCK))
+        self._reduction = FrameReduction(rig, protocol, scatter)
         self._begun_step = (0, 0.0, 0.0)  # its index, and its begin in scan time and running time
         wait_s, clock = rig.camera.reconnect_s, devices.clock
         self._camera = WatchedCamera(devices.camera, rig.camera)
         camera = RetryingCamera(self._camera, clock, wait_s, self._continue_step)
         self._exposer = Exposer(
-            camera, devices.lamp, clock, protocol, rig, record, self._continue_step
+            camera, self._lamp, clock, protocol, rig, record, self._continue_step
         )
 
     def run(self, plan: Plan, progress: Progress | None = None) -> None:
@@ -106,12 +114,32 @@ class Engine:
             self._register_devices()
             if progress is None:
                 self._begin(plan)
-                self._scan(plan, plan.steps)
+                self._measure_all(plan, partial(self._scan, plan, plan.steps))
             else:
-                self._resume(plan, progress)
+                self._restore(plan, progress)
+                self._measure_all(plan, partial(self._go_on, plan, progress))
         finally:
-            self._ended = True
+            self._ended, self._phase = True, "ending"
             self._positioner.make_safe()
+
+    def present(self) -> Present:
+        """Return the present state of scan and rig; from any thread."""
+        positioner, lamp, phase = self._positioner, self._lamp, self._phase
+        asked = positioner.asked
+        if lamp.asked and self._rig.lamp.darkened_by == "hand":
+            asked = "Cover the lamp" if lamp.asked == "darkened" else "Uncover the lamp"
+        if phase in ("homing", "moving", "exposing"):
+            phase = "operator" if asked else "pausing" if self._pause.is_on else phase
+        return Present(
+            phase=phase,
+            step=self._step,
+            pose=positioner.pose,
+            target=positioner.target,
+            moving=positioner.moving,
+            surface=positioner.surface,
+            lamp=lamp.state,
+            asked=asked,
+        )
 
     def _register_devices(self) -> None:
         devices = self._devices
@@ -138,18 +166,43 @@ class Engine:
         self._positioner.home()
         self._open_shutter()
         self._exposer.start_clock(0.0)
-        self._exposer.take_darks(plan.darks_first_s, self._window(self._positioner.pose))
+        self._exposer.take_darks(plan.darks_first_s, self._reduction.window(self._positioner.pose))
 
-    def _resume(self, plan: Plan, progress: Progress) -> None:
-        """Restore the state in which the scan stopped, and measure what is missing.
+    def _restore(self, plan: Plan, progress: Progress) -> None:
+        """Restore the state in which the scan stopped, apart from its pose."""
+        report_found(self._positioner.recover_position(), progress, self._rig)
+        self._open_shutter()
+        self._exposer.restore(progress.readings)
+        self._exposer.take_darks(plan.darks_first_s, self._reduction.window(self._positioner.pose))
+
+    def _measure_all(self, plan: Plan, measure: Callable[[], None]) -> None:
+        """Measure; after each pause of the operator, what is missing then."""
+        while True:
+            try:
+                measure()
+                return
+            except Paused:
+                self._stay_paused()
+                measure = partial(self._go_on, plan, Progress.of(self._record))
+
+    def _stay_paused(self) -> None:
+        """Stand still until the operator lets the scan go on; the lamp stays as it is."""
+        switch, clock, self._phase = self._pause, self._devices.clock, "paused"
+        place = f"{self._positioner.pose}; the lamp is {self._lamp.state}"
+        self._add_event(OPERATOR, f"paused {switch.turned_by}: {place}")
+        switch.say(f"paused at {place}")
+        begun_s = clock.now_s()
+        switch.wait()
+        paused = f"{clock.now_s() - begun_s:.0f} s"
+        self._add_event(OPERATOR, f"continued {switch.turned_by} after {paused}")
+        switch.say(f"goes on after {paused}, with a drift check where the plan has one")
+
+    def _go_on(self, plan: Plan, progress: Progress) -> None:
+        """Measure what is missing after an interruption.
 
         The lamp is checked for drift at the first step, and wherever it is set again for a block
         of which readings are kept: one of them was damaged in the record.
         """
-        report_found(self._positioner.recover_position(), progress, self._rig)
-        self._open_shutter()
-        self._exposer.restore(progress.readings)
-        self._exposer.take_darks(plan.darks_first_s, self._window(self._positioner.pose))
         kept = {reading.block for reading in progress.readings}
         blocks = list(dict.fromkeys(step.block for step in progress.missing(plan)))
         for number, block in enumerate(blocks):
@@ -171,7 +224,7 @@ class Engine:
 
     def _open_shutter(self) -> None:
         if self._rig.lamp.darkened_by == "shutter":
-            self._devices.lamp.light()
+            self._lamp.light()
 
     def _check_drift(self, plan: Plan, progress: Progress, first: Step) -> None:
         """Repeat the last drift check, if the block of the next step has one."""
@@ -185,7 +238,7 @@ class Engine:
         self._begin_step(step.index, progress.elapsed_s)
         elapsed_s = progress.elapsed_s
         for attempt in range(ATTEMPTS):
-            reading = self._measure(self._expose(step))
+            reading = self._reduction.reading(self._expose(step))
             reading = replace(reading, step=original.index, time_s=elapsed_s, free_s=elapsed_s)
             check = progress.check_drift(reading, first)
             if not failed(check):
@@ -209,6 +262,10 @@ class Engine:
     def _measure_steps(self, plan: Plan, steps: Sequence[Step]) -> None:
         waiting = None
         for step in steps:
+            if self._pause.is_on:
+                self._accept(waiting)
+                raise Paused
+            self._step, self._phase = step, "moving"
             self._begin_step(step.index, self._exposer.scan_s())
             if step.surface != self._positioner.surface:
                 self._accept(waiting)  # the operator may take their time, or give up
@@ -251,27 +308,23 @@ class Engine:
 
     def _expose(self, step: Step) -> Exposed:
         """Take the frames of a step; raise `DeviceError` if an axis has moved meanwhile."""
-        exposed = self._exposer.expose(step, self._window(step.pose))
+        window, self._phase = self._reduction.window(step.pose), "exposing"
+        exposed = self._exposer.expose(step, window)
+        self._on_frames(exposed, window)
         self._positioner.require_in_place()
         return exposed
-
-    def _window(self, pose: Pose) -> Window:
-        """Return the window at a pose; perpendicular to the sample if the view angle is unknown."""
-        patch, theta_r = self._protocol.window, pose.theta_r
-        known = 0.0 if math.isnan(theta_r) else theta_r
-        return window_at(known, self._pinhole, patch.width_mm, patch.height_mm)
 
     def _accept_reference(self, exposed: Exposed) -> None:
         """Accept a tile reading or drift check, if need be a second one; else raise `Interlock`.
 
         The rig stands: no point follows a reference that proves nothing.
         """
-        reading = self._measure(exposed)
+        reading = self._reduction.reading(exposed)
         doubt = self._references.doubt(reading)
         if doubt:
             log.warning("%s: measured again", doubt)
             exposed = self._expose(exposed.step)
-            reading = self._measure(exposed)
+            reading = self._reduction.reading(exposed)
             doubt = self._references.doubt(reading)
         if doubt:
             for check in self._references.failed_checks(reading):
@@ -289,7 +342,7 @@ class Engine:
     def _begin_accepting(self, exposed: Exposed | None) -> None:
         """Reduce the frames of a point, whose commit goes on while a move is watched from here."""
         if exposed is not None:
-            self._begin_commit(exposed, self._measure(exposed))
+            self._begin_commit(exposed, self._reduction.reading(exposed))
 
     def _finish_accepting(self, exposed: Exposed | None) -> None:
         """Wait until the disk has what was begun."""
@@ -300,7 +353,9 @@ class Engine:
     def _begin_commit(self, exposed: Exposed, reading: Reading) -> None:
         step, record, preview = exposed.step, self._record, None
         if step.preview:
-            preview = make_preview(exposed, self._window(step.pose), self._rig.camera.max_dn)
+            preview = make_preview(
+                exposed, self._reduction.window(step.pose), self._rig.camera.max_dn
+            )
 
         def write() -> None:
             keeps = self._protocol.keep_frames
@@ -310,38 +365,5 @@ class Engine:
         record.writing.begin(write)
         self._exposer.note_brightness(reading)
 
-    def _measure(self, exposed: Exposed) -> Reading:
-        window, least = self._window(exposed.step.pose), self._protocol.window.min_pixels
-        rig, theta_i_deg = self._rig, exposed.step.pose.theta_i
-        placement = Placement(rig.u_placement_mm, theta_i_deg, rig.lamp_distance_mm)
-        signal = measure(exposed.frames, exposed.dark, window, rig.camera, placement, least)
-        signal = self._scatter.judged(
-            signal, exposed.frames, exposed.dark, window, f"step {exposed.step.index}"
-        )
-        view = View(rig, self._protocol.window, theta_i_deg, exposed.step.pose.theta_r)
-        signal = with_dark_patch(signal, exposed.frames, exposed.dark, view)
-        return _reading(exposed, signal)
-
     def _add_event(self, kind: str, text: str) -> None:
         self._record.add_event(self._devices.clock.utc().isoformat(), kind, text)
-
-
-def _reading(exposed: Exposed, signal: Signal) -> Reading:
-    """Return the row of the record."""
-    step, first = exposed.step, exposed.frames[0]
-    return Reading(
-        step=step.index,
-        kind=step.kind,
-        surface=step.surface,
-        theta_i_deg=step.pose.theta_i,
-        dphi_deg=step.pose.dphi,
-        theta_r_deg=step.pose.theta_r,
-        lamp_setting=step.lamp_setting,
-        block=step.block,
-        exposure_s=first.exposure_s,
-        frames=len(exposed.frames),
-        time_s=exposed.time_s,
-        free_s=exposed.free_s,
-        time_utc=exposed.time_utc,
-        **asdict(signal),
-    )

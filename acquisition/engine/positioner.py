@@ -37,9 +37,10 @@ class Positioner:
         self.pose = home_pose(rig)
         self.surface: Surface | None = None
         self._moves: tuple[Move, ...] = ()
-        self._target = self.pose
+        self.target = self.pose
         self._started = False
-        self._moving = ""  # name of the axis that was told to move last and has not arrived
+        self.moving = ""  # name of the axis that was told to move last and has not arrived
+        self._asked = ""  # of the operator
         self._pauses, self._paused_move = 0, False
 
     def home(self) -> None:
@@ -64,7 +65,7 @@ class Positioner:
             else:
                 axis.home()
         # nan for an axis set by hand
-        self.pose = Pose(**{**home_pose(self._rig)._asdict(), **found})
+        self.pose = self.target = Pose(**{**home_pose(self._rig)._asdict(), **found})
         return found
 
     def move_to(self, pose: Pose) -> None:
@@ -74,7 +75,7 @@ class Positioner:
 
     def start_moves(self, moves: tuple[Move, ...], target: Pose) -> None:
         """Start the first of the moves to a pose, if it is a motor's, and return."""
-        self._moves, self._target = moves, target
+        self._moves, self.target = moves, target
         self._started = bool(moves) and not self._axes[moves[0].axis].by_hand
         if self._started:
             self._start(moves[0])
@@ -90,11 +91,11 @@ class Positioner:
                 self._note(f"{move.axis} set to {axis.position_deg():g} deg")
         for name in dict.fromkeys(move.axis for move in self._moves):
             self._axes[name].settle()
-        self.pose, self._moves = self._target, ()
+        self.pose, self._moves = self.target, ()
 
     def _start(self, move: Move) -> None:
         axis = self._axes[move.axis]
-        self._moving, self._paused_move = move.axis, False
+        self.moving, self._paused_move = move.axis, False
         self._despite_pause(axis, lambda: axis.start_move(move.angle_deg))
 
     def _finish(self, move: Move) -> None:
@@ -105,7 +106,7 @@ class Positioner:
             axis.finish_move()
 
         self._despite_pause(axis, axis.finish_move, whole_move)
-        self._moving = ""
+        self.moving = ""
 
     def _despite_pause(
         self, axis: Axis, action: Callable[[], None], again: Callable[[], None] | None = None
@@ -141,9 +142,19 @@ class Positioner:
         if surface == self.surface:
             return
         request = Request("place", f"Put {name} on the sample table", surface=surface)
+        self._asked = request.text
         answer = self._operator.ask(request)
+        self._asked = ""
         self._note(f"{request.text}: {answer}")
         self.surface = surface
+
+    @property
+    def asked(self) -> str:
+        """Request to the operator that is not done yet, empty if there is none."""
+        moving = self.moving
+        if moving and self._axes[moving].by_hand:
+            return f"Set {moving} to {getattr(self.target, moving):g} deg by hand"
+        return self._asked
 
     def make_safe(self) -> None:
         """Stop every axis and close the shutter, even if some of them fail.
@@ -151,7 +162,7 @@ class Positioner:
         All stops are sent, that of what moves first, before it is waited until the axes were read
         to stand. An action interrupted by a Ctrl-C is repeated, and the interruption is logged.
         """
-        names = sorted(AXES, key=lambda name: name != self._moving)
+        names = sorted(AXES, key=lambda name: name != self.moving)
         axes = [(name, self._axes[name]) for name in names if name in self._axes]
         actions: list[tuple[str, Callable[[], None]]] = [
             *((name, axis.begin_stop) for name, axis in axes),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from acquisition.engine.exposer import Exposed
+from acquisition.engine.exposure.exposer import Exposed
 from acquisition.measure.window import Window
 from instrument.record.reading import Preview
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.engine import engine
+from acquisition.engine import frame_reduction
 from acquisition.engine.engine import Devices, Engine
 from acquisition.plan.moves import Move, moves_between
 from acquisition.plan.plan import Plan, make_plan
@@ -85,8 +85,10 @@ def test_the_stage_is_under_way_while_the_frames_are_reduced(
 ) -> None:
     devices, calls = open_devices(small), []
     axes = {n: Spy(a, calls, n) for n, a in devices.axes.items()}
-    real = engine.measure
-    monkeypatch.setattr(engine, "measure", lambda *a: (calls.append("reduce"), real(*a))[1])
+    real = frame_reduction.measure
+    monkeypatch.setattr(
+        frame_reduction, "measure", lambda *a: (calls.append("reduce"), real(*a))[1]
+    )
     run(small, record, replace(devices, axes=axes))  # type: ignore[arg-type]  # spies
     at = [n for n, call in enumerate(calls) if call == "reduce"][3]  # within one arc
     before = [c for c in calls[:at] if "move" in c][-1]

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from acquisition.engine.exposer import Exposed
+from acquisition.engine.exposure.exposer import Exposed
 from acquisition.engine.preview import make_preview
 from acquisition.measure.radiometry import Dark
 from acquisition.measure.window import window_at

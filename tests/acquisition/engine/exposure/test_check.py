@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.engine.engine import Devices
-from acquisition.engine.exposure_check import ExposureCheck
+from acquisition.engine.exposure.check import ExposureCheck
 from acquisition.measure.linearity import LEAST_RATIO
 from acquisition.plan.exposure_ladder import exposure_ladder_s
 from acquisition.results.reduction import reduced_run

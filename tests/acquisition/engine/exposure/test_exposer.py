@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.engine.exposure_search import ExposureSearch
+from acquisition.engine.exposure.search import ExposureSearch
 from acquisition.measure.window import Window
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded, load_protocol

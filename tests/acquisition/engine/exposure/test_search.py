@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.engine.exposure_search import MAX_EXPOSURES_TRIED, ExposureSearch
+from acquisition.engine.exposure.search import MAX_EXPOSURES_TRIED, ExposureSearch
 from acquisition.measure.window import window_at
 from acquisition.plan.exposure_ladder import exposure_ladder_s
 from instrument.devices import Frame

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from acquisition.engine.exposure_check import ExposureCheck
-from acquisition.engine.exposure_search import ExposureSearch
+from acquisition.engine.exposure.check import ExposureCheck
+from acquisition.engine.exposure.search import ExposureSearch
 from acquisition.engine.retrying_camera import RetryingCamera
 from acquisition.interlocks.darks import REFERENCE_FRAMES, DarkCheck, Excess
 from acquisition.interlocks.doubt import doubt_text

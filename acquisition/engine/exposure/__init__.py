@@ -1,0 +1,1 @@
+"""Exposures of a scan: searched, checked by light, taken with their darks."""
