@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 from contextlib import closing
+from functools import partial
 
 from acquisition.engine.engine import Devices, Engine
 from acquisition.engine.event_log import EventLogHandler, log_to_record
+from acquisition.engine.pause import PauseSwitch
 from acquisition.engine.resume import Progress
+from acquisition.live.channel import channel_of
+from acquisition.live.publisher import Publisher
+from acquisition.live.watched_scan import buttons, seen_of, state_of
 from acquisition.plan.plan import Plan, Step
 from acquisition.rig import open_devices
+from acquisition.terminal import stop_signals
 from acquisition.terminal.console import console, duration_text, warnings_shown
 from acquisition.terminal.orderly_end import orderly_end
+from acquisition.terminal.pause_key import pause_key
 from acquisition.terminal.progress import scan_progress
 from acquisition.terminal.stop_thread import stopped_by_signals
 from instrument.clock import Clock, SystemClock
 from instrument.config.load import Loaded
 from instrument.errors import DeviceError, Interlock, OperatorStop, StorageError, WrongRigFile
 from instrument.record.event_kinds import FAULT, FINISHED, INTERLOCK, STOPPED
-from instrument.record.record import Record
+from instrument.record.record import FILE_NAME, Record
 
 # Loggers of what a person can help with: a record or a camera that is waited for, an exposure, an
 # axis that is not where it was.
@@ -80,8 +87,21 @@ def _run(
             show(step)
 
         stops = {name: axis.stop for name, axis in devices.axes.items() if not axis.by_hand}
-        with stopped_by_signals(stops):
-            Engine(loaded.protocol, loaded.rig, devices, record, on_step).run(plan, progress)
+        switch = PauseSwitch(lambda text: console.print(text, highlight=False, soft_wrap=True))
+        publisher = Publisher(channel_of(record.folder / FILE_NAME), loaded.rig.camera)
+        engine = Engine(
+            loaded.protocol,
+            loaded.rig,
+            devices,
+            record,
+            on_step,
+            on_frames=lambda exposed, window: publisher.show(seen_of(exposed, window)),
+            pause=switch,
+        )
+        state = partial(state_of, engine.present, devices.axes)
+        follow = buttons(switch, engine.present, stop_signals.stop)
+        with stopped_by_signals(stops), publisher.published(state, follow), pause_key(switch):
+            engine.run(plan, progress)
     log.write()
     record.add_event(clock.utc().isoformat(), FINISHED, f"{len(plan.steps)} steps")
     record.set_meta("scan_s", f"{clock.now_s() - begun_s:.1f}")

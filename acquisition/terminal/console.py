@@ -10,6 +10,7 @@ from typing import Any
 from rich.console import Console
 from rich.text import Text
 
+from acquisition.terminal.keys import line_typed
 from acquisition.terminal.layout import note_lines, wrapped
 from acquisition.terminal.streams import HANDLER
 from instrument.text.terminal_safe import escape_control_characters
@@ -49,7 +50,8 @@ def print_notes(notes: Iterable[str]) -> None:
 def ask(question: str) -> str:
     """Print a question and return the stripped answer; raise `EOFError` at the end of input."""
     console.print(question, end=" ", highlight=False, soft_wrap=True)
-    return console.input("").strip()
+    with line_typed():
+        return console.input("").strip()
 
 
 class _Shown(logging.Handler):

@@ -9,6 +9,7 @@ Imported before all else, so it imports nothing heavy.
 
 from __future__ import annotations
 
+import _thread
 import atexit
 import math
 import os
@@ -42,6 +43,7 @@ class _State:
     def __init__(self) -> None:
         self.begun = False
         self.reason = ""  # of the last signal, empty before
+        self.own_reason = ""  # for a signal that the program sends itself
         self.number: int = signal.SIGINT
         self.last_s = -math.inf
         self.orderly = 0  # `orderly_end` blocks that are open
@@ -59,6 +61,7 @@ def begin() -> None:
     They may be blocked until now: the program has restarted itself.
     """
     _state.reason, _state.last_s, _state.exit_code, _state.begun = "", -math.inf, None, True
+    _state.own_reason = ""
     signal.signal(_WAKE, lambda *_: None)
     for number in STOPS:
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
@@ -77,6 +80,18 @@ def ended(exit_code: int) -> None:
     """
     exec("")
     _state.exit_code, _state.begun = exit_code, False
+
+
+def stop(reason: str) -> None:
+    """End the command as SIGTERM does, from any thread; `reason`: text for the record.
+
+    Where its signals do not end the command, as in a notebook, it is interrupted as by Ctrl-C.
+    """
+    if _state.begun:
+        _state.own_reason = reason
+        os.kill(os.getpid(), signal.SIGTERM)
+    else:
+        _thread.interrupt_main()
 
 
 def begun() -> bool:
@@ -144,7 +159,7 @@ def _on_signal(number: int, frame: FrameType | None) -> None:
         os.write(_state.heard_fd, bytes([HEARD]))
     if soon:
         return
-    _state.reason, _state.number = STOPS[number], number
+    _state.reason, _state.number = _state.own_reason or STOPS[number], number
     if _state.exit_code is not None:
         os._exit(_state.exit_code)
     if not _state.orderly:

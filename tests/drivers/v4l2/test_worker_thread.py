@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from instrument.errors import DeviceError
 from sim.emulated.v4l2.device import Exposure
+from tests.support.deadline import wait_for
 from tests.support.v4l2.remote_camera import (
     FOUND_WITHIN_S,
     SETTINGS,
@@ -18,7 +19,6 @@ from tests.support.v4l2.remote_camera import (
     LevelScene,
     RemoteCamera,
     served,
-    wait_for,
 )
 
 pytestmark = pytest.mark.real_time

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tests.support.v4l2.remote_camera import wait_for
+from tests.support.deadline import wait_for
 
 
 def _held() -> tuple[set[str], int]:

@@ -12,8 +12,7 @@ import signal
 import socket
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing.connection import Connection
@@ -30,11 +29,11 @@ from instrument.devices import Frame
 from sim.emulated.v4l2.device import Capabilities, EmulatedCamera, Exposure
 from sim.emulated.v4l2.server import V4l2Server
 from sim.emulated.v4l2.shim import compile_shim, shim_environment
+from tests.support.deadline import DEADLINE_S, wait_for
 from tests.support.paths import ROOT
 
 DEVICE = "/dev/v4l/by-id/usb-emulated-camera"
 WHO = re.escape(f"camera Emulated camera ({DEVICE})")
-DEADLINE_S = 20.0
 FOUND_WITHIN_S = 2.0  # beyond the exposure: a lost camera is reported
 SETTINGS = V4l2Settings(
     device=DEVICE, pixel_format="Y16", width_px=64, height_px=48, bit_depth=16,
@@ -159,11 +158,3 @@ def child(factory: pytest.TempPathFactory) -> Iterator[RemoteCamera]:
         yield remote
     finally:
         remote.end()
-
-
-def wait_for(condition: Callable[[], bool], what: str) -> None:
-    """Return once the condition is true; fail at the deadline."""
-    until_s = time.monotonic() + DEADLINE_S
-    while not condition():
-        assert time.monotonic() < until_s, f"{what}: not within {DEADLINE_S} s"
-        time.sleep(0.001)

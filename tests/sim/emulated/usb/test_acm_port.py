@@ -26,9 +26,9 @@ from sim.emulated.usb.device import Stall
 from sim.emulated.usb.server import UsbIpServer
 from sim.emulated.usb.usbip import Submitted
 from sim.emulated.wire import Fault
+from tests.support.deadline import wait_for
 from tests.support.usb.left_behind import nothing_left_behind
 from tests.support.usb.usbip_client import UsbIpClient, imported
-from tests.support.v4l2.remote_camera import wait_for
 
 _CLASS_TO_INTERFACE = 0x21
 _READ_BYTES = 128  # cdc_acm reads twice wMaxPacketSize

@@ -1,0 +1,122 @@
+"""Scan that is watched: paused and aborted from outside or by a key, and what that leaves."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from acquisition.live import channel
+from instrument.record.event_kinds import DRIFT, OPERATOR, STOPPED
+from instrument.record.record import FILE_NAME, Record
+from tests.support.command import gonio
+from tests.support.deadline import wait_for
+from tests.support.paths import ROOT
+from tests.support.scans import small_demo
+from tests.support.terminal_session import TerminalSession
+
+pytestmark = [pytest.mark.waits, pytest.mark.usefixtures("own_folder")]
+
+LONG_S = 120.0
+
+
+@contextmanager
+def scanning(run: Path) -> Iterator[tuple[subprocess.Popen[str], Path]]:
+    """Run the demonstration, paused as soon as it can be; yield its process and its channel."""
+    command = [sys.executable, "-m", "acquisition", "run", small_demo(run.parent), "--out", run]
+    with subprocess.Popen(
+        command, cwd=ROOT,
+        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        try:
+            folder = the_channel_of(run)
+            assert channel.send(folder, channel.PAUSE) == channel.OK
+            yield process, folder
+        finally:
+            process.kill()
+
+
+def the_channel_of(run: Path) -> Path:
+    wait_for((run / FILE_NAME).exists, "the record", LONG_S)
+    folder = channel.channel_of(run / FILE_NAME)
+    wait_for((folder / channel.SOCKET_FILE).exists, "the channel", LONG_S)
+    return folder
+
+
+def phase(folder: Path) -> str:
+    channel.send(folder, channel.WATCH)
+    return str((channel.read_state(folder) or {}).get("phase"))
+
+
+def test_a_pause_from_outside_stands_until_it_is_lifted_and_every_point_is_measured(
+    tmp_path: Path,
+) -> None:
+    run = tmp_path / "run"
+    with scanning(run) as (process, folder):
+        wait_for(lambda: phase(folder) == "paused", "a pause", LONG_S)
+        state = channel.read_state(folder) or {}
+        assert state["lamp"] == "lit"
+        assert not any(axis["moving"] for axis in state["axes"].values())
+        assert channel.send(folder, channel.RESUME) == channel.OK
+        process.communicate(timeout=LONG_S)
+        assert process.returncode == 0
+    assert not folder.exists()
+    with Record.open(run) as record:
+        assert len(record.readings()) == int(record.meta("steps") or 0)
+        texts = [text for _, kind, text in record.events() if kind == OPERATOR]
+    assert sum(text.startswith("paused on the live page: theta_i ") for text in texts) == 1
+    assert sum(text.startswith("continued on the live page after ") for text in texts) == 1
+
+
+def test_an_abort_in_a_pause_leaves_a_safe_rig_and_a_run_that_resumes(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    with scanning(run) as (process, folder):
+        wait_for(lambda: phase(folder) == "paused", "a pause", LONG_S)
+        assert channel.send(folder, channel.ABORT) == channel.OK
+        _, said = process.communicate(timeout=LONG_S)
+    assert process.returncode == 4
+    assert "stopped by the operator on the live page: all motion has ended." in said
+    assert f"gonio resume {run}" in said
+    with Record.open(run) as record:
+        stopped = [text for _, kind, text in record.events() if kind == STOPPED]
+        assert stopped == ["stopped by the operator on the live page"]
+    assert gonio("resume", run, "--yes").returncode == 0
+    assert json.loads((run / "fit.json").read_text())["verdict"] == "adequate"
+
+
+def test_the_key_p_pauses_the_scan_and_lets_it_go_on(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    with TerminalSession(
+        ("-m", "acquisition", "run", small_demo(tmp_path), "--out", run)
+    ) as session:
+        session.read_until("p pauses the scan and lets it go on; Ctrl-C stops it", LONG_S)
+        session.press("p")
+        session.read_until("paused at theta_i ", LONG_S)
+        session.press("p")
+        session.read_until("goes on after ", LONG_S)
+        assert session.wait(LONG_S) == 0, session.text
+        assert session.is_as_before
+    with Record.open(run) as record:
+        kinds = [kind for _, kind, _ in record.events()]
+        texts = [text for _, kind, text in record.events() if kind == OPERATOR]
+    assert any(text.startswith("paused at the terminal: ") for text in texts)
+    assert kinds.count(DRIFT) <= 1
+
+
+def test_ctrl_c_in_a_pause_stops_the_scan_and_gives_the_terminal_back(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    with TerminalSession(
+        ("-m", "acquisition", "run", small_demo(tmp_path), "--out", run)
+    ) as session:
+        session.read_until("p pauses the scan", LONG_S)
+        session.press("p")
+        session.read_until("paused at theta_i ", LONG_S)
+        session.press("\x03")
+        assert session.wait(LONG_S) == 4, session.text
+        assert session.is_as_before
+        assert "stopped by the operator: all motion has ended." in session.text

@@ -1,0 +1,79 @@
+"""Command at a terminal of its own, into which keys are typed."""
+
+from __future__ import annotations
+
+import os
+import select
+import subprocess
+import sys
+import termios
+import time
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Self
+
+from tests.support.deadline import DEADLINE_S
+from tests.support.paths import ROOT
+
+# The new session takes the terminal as its own, as a shell's login does.
+_OWN_TERMINAL = (
+    "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+    "os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
+)
+
+
+class TerminalSession:
+    """Python with these arguments; `text`: all that it has written so far."""
+
+    def __init__(self, arguments: Sequence[object]) -> None:
+        self._terminal, slave = os.openpty()
+        self.before = termios.tcgetattr(slave)
+        self.text = ""
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _OWN_TERMINAL, *map(str, arguments)],
+            cwd=ROOT, stdin=slave, stdout=slave, stderr=slave, start_new_session=True,
+        )  # fmt: skip
+        self._slave = slave  # stays open, so that its settings can be read in the end
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._process.kill()
+        self._process.wait(DEADLINE_S)
+        os.close(self._terminal)
+        os.close(self._slave)
+
+    @property
+    def is_as_before(self) -> bool:
+        """True if the terminal has the settings with which the command began."""
+        return termios.tcgetattr(self._slave) == self.before
+
+    def press(self, keys: str) -> None:
+        """Press keys."""
+        os.write(self._terminal, keys.encode())
+
+    def read_until(self, text: str, deadline_s: float = DEADLINE_S) -> None:
+        """Read until a text has come, anew since the last call; fail at the deadline."""
+        seen, until_s = len(self.text), time.monotonic() + deadline_s
+        while text not in self.text[seen:]:
+            assert time.monotonic() < until_s, f"{text!r} has not come: {self.text!r}"
+            self.look(0.1)
+
+    def look(self, seconds: float) -> None:
+        """Read what is written within this time, at most once."""
+        if select.select([self._terminal], [], [], seconds)[0]:
+            self.text += os.read(self._terminal, 65536).decode("utf-8", "replace")
+
+    def wait(self, deadline_s: float = DEADLINE_S) -> int:
+        """Return the exit code; what is written meanwhile is read."""
+        until_s = time.monotonic() + deadline_s
+        while self._process.poll() is None:
+            assert time.monotonic() < until_s, f"it runs on: {self.text!r}"
+            self.look(0.01)
+        return self._process.returncode
