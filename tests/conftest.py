@@ -17,8 +17,8 @@ from hypothesis import HealthCheck, settings
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from instrument.config.load import Loaded, load_protocol
-from tests.support import standstill
 from tests.support.paths import CONFIGS
+from tests.support.timing import standstill
 
 if TYPE_CHECKING:
     from tests.support.v4l2.remote_camera import RemoteCamera

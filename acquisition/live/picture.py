@@ -48,7 +48,7 @@ def numbers_of(frame: Frame, window: Window, camera: CameraConfig) -> PictureNum
 
 
 def jpeg_of(image: Image, max_dn: float) -> bytes:
-    """Return a frame as a grey JPEG, whole and at most at its own size.
+    """Return a frame, (rows, columns) in DN, as a grey JPEG, whole and at most at its own size.
 
     A saturated pixel (at `max_dn` or above) is a red spot of 3 by 3, which can be seen.
     """
@@ -66,10 +66,11 @@ def jpeg_of(image: Image, max_dn: float) -> bytes:
 
 
 def sharpness(image: Image, black_level_dn: float) -> float:
-    """Return a measure of focus, relative to the brightness: the larger, the sharper.
+    """Return a measure of focus of a frame, (rows, columns) in DN: the larger, the sharper.
 
-    Root mean square of the gradient, after a blur that takes off most of the noise (Tenengrad:
-    Pertuz, Puig and Garcia 2013, Pattern Recognition 46, 1415, operator GRA6).
+    It is relative to the brightness, and has no unit: the root mean square of the gradient,
+    after a blur that takes off most of the noise (Tenengrad: Pertuz, Puig and Garcia 2013, Pattern
+    Recognition 46, 1415, operator GRA6).
     """
     import cv2
 

@@ -19,7 +19,7 @@ import pytest
 from analysis.models import MODELS
 from analysis.models.rough.oren_nayar_exact import FINE, clear_profile_cache, oren_nayar_exact_brdf
 from instrument.geometry import Geometry
-from tests.support.cpu_time import cpu_seconds
+from tests.support.timing.cpu_time import cpu_seconds
 
 EXACT, FUNCTIONAL = MODELS["oren_nayar_exact"], MODELS["oren_nayar"]
 COUNT = 16384

@@ -21,7 +21,7 @@ from analysis.data.measurements import Measurements
 from analysis.fit.fit import FitResult, fit
 from analysis.models import MODELS
 from instrument.geometry import FloatArray, Geometry
-from tests.support.cpu_time import cpu_ratio, cpu_seconds
+from tests.support.timing.cpu_time import cpu_ratio, cpu_seconds
 
 THETA_I = np.repeat([15.0, 30.0, 45.0, 60.0], 50)
 THETA_R = np.tile(np.linspace(-75, 75, 50), 4)

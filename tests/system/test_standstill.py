@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 
 from tests.support.paths import ROOT
-from tests.support.standstill import TRIES
+from tests.support.timing.standstill import TRIES
 
 CONFTEST = """
 import pytest
-from tests.support import standstill
+from tests.support.timing import standstill
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "waits: in real time")

@@ -14,8 +14,8 @@ from acquisition.measure.window import Window
 from instrument.config.rig import Rig
 from instrument.devices import Frame
 from instrument.errors import Interlock
-from tests.support.cpu_time import cpu_seconds
 from tests.support.synthetic_frames import RIGS, dark_of, noisy_frames, signal_of, window_of
+from tests.support.timing.cpu_time import cpu_seconds
 
 BITS, COUNTS = (8, 12), (1, 2, 4, 16)
 SHAPES, LEVELS = ((5, 6), (60, 70)), (0.0, 0.02, 0.7, 1.2)

@@ -11,8 +11,8 @@ import pytest
 from acquisition.interlocks.frozen_picture import FrozenPicture, differing_pixels
 from instrument.devices import Frame
 from instrument.errors import Interlock
-from tests.support.cpu_time import cpu_seconds
 from tests.support.synthetic_frames import RIGS, noisy_frames
+from tests.support.timing.cpu_time import cpu_seconds
 
 SHAPES = [(16, 24), (60, 70), (480, 640)]
 

@@ -17,7 +17,7 @@ from acquisition.measure.window import Window, window_at
 from instrument.config.load import Loaded
 from instrument.devices import Frame
 from instrument.pinhole import Pinhole
-from tests.support.deadline import wait_for
+from tests.support.timing.deadline import wait_for
 
 
 @pytest.fixture

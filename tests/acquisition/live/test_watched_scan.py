@@ -15,10 +15,10 @@ from acquisition.live import channel
 from instrument.record.event_kinds import DRIFT, OPERATOR, STOPPED
 from instrument.record.record import FILE_NAME, Record
 from tests.support.command import gonio
-from tests.support.deadline import wait_for
 from tests.support.paths import ROOT
 from tests.support.scans import small_demo
-from tests.support.terminal_session import TerminalSession
+from tests.support.terminal.session import TerminalSession
+from tests.support.timing.deadline import wait_for
 
 pytestmark = [pytest.mark.waits, pytest.mark.usefixtures("own_folder")]
 

@@ -10,13 +10,13 @@ import threading
 import pytest
 
 from acquisition.terminal.keys import keys_heard
-from tests.support.deadline import wait_for
 from tests.support.paths import ROOT
-from tests.support.terminal_session import TerminalSession
+from tests.support.terminal.session import TerminalSession
+from tests.support.timing.deadline import wait_for
 
 pytestmark = pytest.mark.waits
 
-CHILD = ("-m", "tests.support.keys_child")
+CHILD = ("-m", "tests.support.terminal.keys_child")
 
 
 def test_keys_are_heard_at_once_and_not_by_a_prompt_that_waits_for_a_line() -> None:

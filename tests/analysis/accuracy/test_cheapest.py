@@ -12,8 +12,8 @@ from analysis.models.base import Ranges
 from analysis.models.rough.form_error_table import LIMIT_DEG
 from analysis.models.rough.oren_nayar_exact import FINE, clear_profile_cache, oren_nayar_exact_brdf
 from instrument.geometry import Geometry
-from tests.support.cpu_time import cpu_seconds
 from tests.support.models.method_scenes import angles, drawn_ranges, within
+from tests.support.timing.cpu_time import cpu_seconds
 
 Random = np.random.Generator
 

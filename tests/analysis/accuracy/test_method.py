@@ -11,8 +11,8 @@ from analysis.accuracy.method import relative_error
 from analysis.accuracy.rough_surface import ROUGH_SURFACE
 from analysis.models.rough.oren_nayar_exact import clear_profile_cache
 from instrument.geometry import Geometry
-from tests.support.cpu_time import cpu_seconds
 from tests.support.models.method_scenes import angles, drawn_ranges, within
+from tests.support.timing.cpu_time import cpu_seconds
 
 
 @settings(max_examples=12)

@@ -11,7 +11,7 @@ from analysis.data.measurements import Measurements
 from analysis.data.sweeps import plane_and_view, signed_view, sweeps
 from instrument.geometry import Geometry
 from tests.support.analysis.seeded_scan import three_sweeps
-from tests.support.cpu_time import cpu_ratio
+from tests.support.timing.cpu_time import cpu_ratio
 
 
 def test_sweeps_are_by_incidence_and_plane_with_rising_view() -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from drivers.v4l2.settings import PixelFormat
 from instrument.errors import DeviceError
 from sim.emulated.v4l2.device import Exposure
-from tests.support.deadline import wait_for
+from tests.support.timing.deadline import wait_for
 from tests.support.v4l2.remote_camera import (
     DEVICE,
     SETTINGS,

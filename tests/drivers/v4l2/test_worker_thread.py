@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from instrument.errors import DeviceError
 from sim.emulated.v4l2.device import Exposure
-from tests.support.deadline import wait_for
+from tests.support.timing.deadline import wait_for
 from tests.support.v4l2.remote_camera import (
     FOUND_WITHIN_S,
     SETTINGS,

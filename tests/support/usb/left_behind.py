@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tests.support.deadline import wait_for
+from tests.support.timing.deadline import wait_for
 
 
 def _held() -> tuple[set[str], int]:

@@ -29,8 +29,8 @@ from instrument.devices import Frame
 from sim.emulated.v4l2.device import Capabilities, EmulatedCamera, Exposure
 from sim.emulated.v4l2.server import V4l2Server
 from sim.emulated.v4l2.shim import compile_shim, shim_environment
-from tests.support.deadline import DEADLINE_S, wait_for
 from tests.support.paths import ROOT
+from tests.support.timing.deadline import DEADLINE_S, wait_for
 
 DEVICE = "/dev/v4l/by-id/usb-emulated-camera"
 WHO = re.escape(f"camera Emulated camera ({DEVICE})")

@@ -13,7 +13,7 @@ from acquisition.benchmark.studies.fit_truth import (
     random_starts,
 )
 from tests.support.benchmark import FEW, trial_of
-from tests.support.cpu_time import cpu_ratio
+from tests.support.timing.cpu_time import cpu_ratio
 
 
 def test_the_program_finds_every_optimum() -> None:

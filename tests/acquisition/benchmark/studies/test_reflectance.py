@@ -23,7 +23,7 @@ from analysis.models.rough.form_error_table import ERROR as TABLE_ERROR
 from analysis.models.rough.oren_nayar_exact import clear_profile_cache, oren_nayar_exact_brdf
 from instrument.geometry import Geometry
 from tests.support.benchmark import FEW, trial_of, worst
-from tests.support.cpu_time import cpu_ratio
+from tests.support.timing.cpu_time import cpu_ratio
 
 
 def test_the_rough_surface_is_as_accurate_as_specified() -> None:

@@ -10,7 +10,7 @@ from acquisition.benchmark.studies.window_methods import (
 )
 from acquisition.benchmark.window_truth import picture, shipped_camera
 from tests.support.benchmark import FEW, trial_of
-from tests.support.cpu_time import cpu_ratio
+from tests.support.timing.cpu_time import cpu_ratio
 
 
 def test_exact_coverage_is_accurate_at_every_view_angle() -> None:

@@ -26,7 +26,7 @@ from sim.emulated.usb.device import Stall
 from sim.emulated.usb.server import UsbIpServer
 from sim.emulated.usb.usbip import Submitted
 from sim.emulated.wire import Fault
-from tests.support.deadline import wait_for
+from tests.support.timing.deadline import wait_for
 from tests.support.usb.left_behind import nothing_left_behind
 from tests.support.usb.usbip_client import UsbIpClient, imported
 

@@ -18,7 +18,7 @@ from sim.emulated.usb.usbip import ProtocolError
 from sim.emulated.usb.uvc_camera import UvcCamera
 from sim.emulated.usb.uvc_descriptors import Probe, interval
 from sim.emulated.v4l2.device import EmulatedCamera
-from tests.support.deadline import wait_for
+from tests.support.timing.deadline import wait_for
 from tests.support.usb.cameras import QUICK, RATES, imported_camera, render
 from tests.support.usb.left_behind import nothing_left_behind
 from tests.support.usb.usbip_client import DEADLINE_S, UsbIpClient, imported, listed

@@ -16,7 +16,7 @@ from sim.emulated.usb.uvc_camera import UvcCamera
 from sim.emulated.usb.uvc_controls import CONTROLS
 from sim.emulated.usb.uvc_descriptors import Probe, interval
 from sim.emulated.v4l2.device import EmulatedCamera, Exposure
-from tests.support.deadline import DEADLINE_S, wait_for
+from tests.support.timing.deadline import DEADLINE_S, wait_for
 from tests.support.usb.cameras import QUICK, RATES, Bench, imported_camera, render
 from tests.support.usb.uvc_host import UvcFrame, pixels
 

@@ -10,7 +10,7 @@ from sim.emulated.usb import usbip, vhci
 from sim.emulated.usb.acm_port import AcmWire
 from sim.emulated.usb.server import UsbIpServer
 from sim.emulated.usb.usbip import ProtocolError
-from tests.support.deadline import wait_for
+from tests.support.timing.deadline import wait_for
 
 # As Linux 6.1 lists its ports (drivers/usb/usbip/vhci_sysfs.c), the first one in use.
 STATUS = """hub port sta spd dev      sockfd local_busid

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
-from tests.support.deadline import DEADLINE_S
 from tests.support.paths import ROOT
+from tests.support.timing.deadline import DEADLINE_S
 
 # The new session takes the terminal as its own, as a shell's login does.
 _OWN_TERMINAL = (
