@@ -9,6 +9,7 @@ import { Actions } from './panels/actions.js';
 import { showAim } from './panels/aim.js';
 import { showAttention } from './panels/attention.js';
 import { showEvents } from './panels/events.js';
+import { showKeptFrames } from './panels/kept_frames.js';
 import { showLevels } from './panels/levels.js';
 import { Picture } from './panels/picture.js';
 import { showRig } from './panels/rig.js';
@@ -19,7 +20,7 @@ import { Selection } from './selection.js';
 import { follow } from './stream.js';
 import { useTheme } from './theme.js';
 
-const TOGETHER_MS = 40; // messages that arrive within this time are shown at once
+const TOGETHER_MS = 100; // messages that arrive within this time are shown at once
 
 const scan = new Scan();
 const selection = new Selection(showAll);
@@ -45,6 +46,7 @@ function showAll() {
   showAttention(scan, selection);
   showSelected(scan, point);
   picture.show(scan);
+  showKeptFrames(scan, selection);
   showLevels(scan);
   showAim(scan);
   showRig(scan);

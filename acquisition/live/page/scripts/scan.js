@@ -12,8 +12,11 @@ export const KINDS = [
   'aim',
 ];
 
+const DRAWN = ['reset', 'run', 'point', 'model'];
+
 export class Scan {
   constructor() {
+    this.drawing = 0; // grows with everything that the chart shows
     this.clear();
   }
 
@@ -36,6 +39,7 @@ export class Scan {
     else if (kind === 'point') this.points.set(data.step, data);
     else if (kind === 'happened') this.events.set(data.number, data);
     else this[kind] = data;
+    if (DRAWN.includes(kind)) this.drawing += 1;
     if (kind === 'aim') this.sharpness = [...this.sharpness, data.sharpness].slice(-200);
   }
 

@@ -7,17 +7,20 @@ import { address, isRefused } from './requests.js';
 const AGAIN_MS = 2000;
 
 // `take(kind, data)` gets each message; `connection` gets 'open', 'lost' or 'refused'.
-export function follow(take, connection) {
+export function follow(take, connection, again = false) {
   const source = new EventSource(address('/events'));
   for (const kind of KINDS) {
     source.addEventListener(kind, (event) => take(kind, parsed(event.data)));
   }
-  source.onopen = () => connection('open');
+  source.onopen = () => {
+    if (again) take('reset', null); // the server sends everything
+    connection('open');
+  };
   source.onerror = async () => {
     connection('lost');
     if (source.readyState !== EventSource.CLOSED) return;
     if (await isRefused()) connection('refused');
-    else setTimeout(() => follow(take, connection), AGAIN_MS);
+    else setTimeout(() => follow(take, connection, true), AGAIN_MS);
   };
 }
 

@@ -1,5 +1,6 @@
 // Chart of the curves: uPlot gives axes, grid and size, `drawing.js` the rest. A click selects.
 
+import { number } from '../format.js';
 import { colour } from '../theme.js';
 import { nearest, xRange, yRange } from './curves.js';
 import { drawCurves, frameOf } from './drawing.js';
@@ -15,11 +16,24 @@ const X_LABELS = {
 
 export class Chart {
   constructor(parent, select) {
-    Object.assign(this, { parent, select, curves: [], selected: null, labels: '', plot: null });
+    Object.assign(this, {
+      parent,
+      select,
+      curves: [],
+      selected: null,
+      labels: '',
+      plot: null,
+      drawn: null,
+    });
     new ResizeObserver(() => this.plot?.setSize(this.size())).observe(parent);
   }
 
+  // Nothing is drawn again for messages that change nothing here, such as a moving axis.
   show(scan, curves, selected) {
+    const theme = document.documentElement.dataset.theme;
+    const key = [scan.drawing, theme, selected?.step, ...curves.map((curve) => curve.name)].join();
+    if (key === this.drawn) return;
+    this.drawn = key;
     Object.assign(this, { curves, selected, x: xRange(scan, curves), y: yRange(curves) });
     this.label(X_LABELS[scan.run?.sweep] ?? 'Angle (°)', valueLabel(scan.run));
     this.plot.setData([this.x, this.y]); // only for the axes
@@ -50,7 +64,7 @@ export class Chart {
       ...this.size(),
       scales: { x: { time: false, range: () => this.x }, y: { range: () => this.y } },
       series: [{}, { show: true, paths: () => null, points: { show: false } }],
-      axes: [axis(xLabel, 34, (v) => `${v}°`), axis(yLabel, 62, (v) => String(v))],
+      axes: [axis(xLabel, 34, '°'), axis(yLabel, 62, '')],
       legend: { show: false },
       cursor: { show: false },
       hooks: { draw: [(plot) => drawCurves(frameOf(plot), this.curves, this.selected)] },
@@ -77,7 +91,7 @@ function valueLabel(run) {
   return `${run.quantity === 'BRDF' ? 'BRDF fᵣ' : 'Radiance'} (${run.unit})`;
 }
 
-function axis(label, size, word) {
+function axis(label, size, unit) {
   return {
     label,
     size,
@@ -87,6 +101,13 @@ function axis(label, size, word) {
     stroke: () => colour('--ink'),
     grid: { stroke: () => colour('--rule'), width: 1 },
     ticks: { stroke: () => colour('--soft'), width: 1 },
-    values: (plot, splits) => splits.map((v) => word(v).replace('-', '\u2212')),
+    values: (plot, splits, index, space, step) => splits.map((v) => tick(v, step) + unit),
   };
+}
+
+// All numbers of an axis with the decimals that its step needs.
+function tick(value, step) {
+  const decimals = Math.max(0, Math.ceil(-Math.log10(step) - 1e-6));
+  if (decimals > 4 || step > 1e4) return number(value);
+  return value.toFixed(decimals).replace('-', '\u2212');
 }

@@ -5,8 +5,11 @@ import { colour } from '../theme.js';
 import { isFlagged } from './curves.js';
 import { drawFlag, drawSymbol, FLAG_RADIUS, styleOf } from './symbols.js';
 
-// Radius of symbols in CSS pixels: smaller on a phone, where points stand close.
-const radiusOf = ({ width, scale }) => (width / scale < 450 ? 2.8 : 4);
+// Radius of symbols in CSS pixels: smaller where many points stand side by side.
+function radiusOf({ width, scale }, curves) {
+  const most = Math.max(1, ...curves.map((curve) => curve.points.length));
+  return Math.min(Math.max(width / scale / most / 2.2, 1.8), 4);
+}
 
 // `toX`, `toY`: pixels of a value; a point without value, or beyond the axis, stands at the edge.
 export function frameOf(plot) {
@@ -29,14 +32,15 @@ export function drawCurves(frame, curves, selected) {
   context.beginPath();
   context.rect(frame.left, frame.top, frame.width, frame.height);
   context.clip();
-  for (const curve of curves) drawCurve(frame, curve);
+  const radius = radiusOf(frame, curves) * frame.scale;
+  for (const curve of curves) drawCurve(frame, curve, radius);
   for (const curve of curves) drawFlags(frame, curve.points.filter(isFlagged));
   if (selected?.kind === 'point') drawSelected(frame, selected);
   context.restore();
 }
 
-function drawCurve(frame, curve) {
-  const { context, scale } = frame;
+function drawCurve(frame, curve, radius) {
+  const { context } = frame;
   const style = styleOf(curve.index);
   context.strokeStyle = style.colour;
   context.fillStyle = style.colour;
@@ -44,7 +48,7 @@ function drawCurve(frame, curve) {
   context.setLineDash([]);
   for (const point of curve.points.filter((p) => p.value !== null && !isFlagged(p))) {
     drawBar(frame, point);
-    drawSymbol(context, style.symbol, ...frame.placed(point), radiusOf(frame) * scale);
+    drawSymbol(context, style.symbol, ...frame.placed(point), radius);
   }
 }
 

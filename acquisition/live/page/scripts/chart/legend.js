@@ -2,6 +2,7 @@
 
 import { by, fill, make, write } from '../dom.js';
 import { count } from '../format.js';
+import { ENDED } from '../words.js';
 import { curvesOf, isFlagged } from './curves.js';
 import { drawSymbol, flagSwatch, styleOf, swatch } from './symbols.js';
 
@@ -21,7 +22,7 @@ export class Legend {
     const theme = document.documentElement.dataset.theme;
     const rows = curves.map(({ name, index }) => ({ name, index, shown: !this.hidden.has(name) }));
     fill(by('legend'), { rows, flags, theme }, () => this.entries(rows, flags));
-    write('model', modelInWords(scan.model));
+    write('model', modelInWords(scan));
     write('chart-note', note(scan, curves));
   }
 
@@ -61,9 +62,10 @@ function key(index) {
   });
 }
 
-function modelInWords(model) {
-  if (!model) return '';
-  return model.name ? `Lines: the best model so far, ${model.text}.` : model.text;
+function modelInWords({ model, progress }) {
+  if (!model?.name) return model?.text ?? '';
+  const soFar = ENDED.includes(progress?.state) ? '' : ' so far';
+  return `Lines: the best model${soFar}, ${model.text}.`;
 }
 
 function note(scan, curves) {

@@ -11,7 +11,7 @@ export class Picture {
 
   show(scan) {
     if (!scan.picture) {
-      write('no-picture', 'No picture from the camera now. Select a point to see its frame.');
+      write('no-picture', 'No picture from the camera now.');
     } else if (scan.picture.number !== this.shown && this.loading === null) {
       this.load(scan);
     }

@@ -1,12 +1,14 @@
 // The rig: position of each axis, and the lamp.
 
-import { by, fill, make } from '../dom.js';
+import { by, fill, make, show } from '../dom.js';
 import { degrees } from '../format.js';
 
 const LAMP = { lit: '● lit', darkened: '○ darkened', unknown: '? not known' };
 
 export function showRig({ rig }) {
-  if (!rig) return;
+  const known = Boolean(rig) && (rig.axes.length > 0 || rig.lamp !== 'unknown');
+  show('rig', known);
+  if (!known) return;
   const rows = rig.axes.map((axis) => [axis.label, degrees(axis.deg), stateOf(axis)]);
   fill(by('axes'), [...rows, ['Lamp', LAMP[rig.lamp] ?? rig.lamp, '']], (all) => all.map(row));
 }
