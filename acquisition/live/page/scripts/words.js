@@ -20,7 +20,7 @@ export const ENDED = ['finished', 'stopped', 'failed', 'lost'];
 
 // Each flag of a reading: what was seen, and what to look at. Others are shown as they are.
 const FLAGS = {
-  saturated: (p) => `${saturated(p)}. Lower exposure_target, or look for a mirror-like reflection.`,
+  saturated: (p) => `${saturated(p)}. Lower exposure_target, close the aperture or dim the lamp.`,
   'window leaves frame': () => 'the measured window leaves the picture. Look at the camera’s aim.',
   'too few pixels': (p) => `the window covers only ${number(p.window_pixels, 3)} pixels.`,
   'hot pixels': () => 'hot pixels cover too much of the window.',

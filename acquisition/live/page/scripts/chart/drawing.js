@@ -5,6 +5,8 @@ import { colour } from '../theme.js';
 import { isFlagged } from './curves.js';
 import { drawFlag, drawSymbol, FLAG_RADIUS, styleOf } from './symbols.js';
 
+const FLAG_REACH = FLAG_RADIUS + 2.5; // with its ring
+
 // Radius of symbols in CSS pixels: smaller where many points stand side by side.
 function radiusOf({ width, scale }, curves) {
   const most = Math.max(1, ...curves.map((curve) => curve.points.length));
@@ -18,7 +20,7 @@ export function frameOf(plot) {
   const toX = (x) => plot.valToPos(x, 'x', true);
   const toY = (y) => plot.valToPos(y, 'y', true);
   const inside = (y) =>
-    Math.min(Math.max(y, top + FLAG_RADIUS * scale), top + height - FLAG_RADIUS * scale);
+    Math.min(Math.max(y, top + FLAG_REACH * scale), top + height - FLAG_REACH * scale);
   const placed = (point) => [
     toX(point.x_deg),
     inside(point.value === null ? Infinity : toY(point.value)),
@@ -34,7 +36,7 @@ export function drawCurves(frame, curves, selected) {
   context.clip();
   const radius = radiusOf(frame, curves) * frame.scale;
   for (const curve of curves) drawCurve(frame, curve, radius);
-  for (const curve of curves) drawFlags(frame, curve.points.filter(isFlagged));
+  for (const curve of curves) drawFlags(frame, curve);
   if (selected?.kind === 'point') drawSelected(frame, selected);
   context.restore();
 }
@@ -74,8 +76,17 @@ function drawBar({ context, scale, toX, toY }, point) {
   context.stroke();
 }
 
-function drawFlags({ context, scale, placed }, points) {
-  for (const point of points) drawFlag(context, ...placed(point), FLAG_RADIUS * scale);
+// The ring around a flag has the colour of its curve.
+function drawFlags({ context, scale, placed }, curve) {
+  context.setLineDash([]);
+  for (const point of curve.points.filter(isFlagged)) {
+    const [x, y] = placed(point);
+    context.fillStyle = styleOf(curve.index).colour;
+    context.beginPath();
+    context.arc(x, y, FLAG_REACH * scale, 0, 2 * Math.PI);
+    context.fill();
+    drawFlag(context, x, y, FLAG_RADIUS * scale);
+  }
 }
 
 function drawSelected({ context, scale, top, height, placed }, point) {
@@ -83,14 +94,14 @@ function drawSelected({ context, scale, top, height, placed }, point) {
   context.strokeStyle = colour('--ink');
   context.lineWidth = 2 * scale;
   context.beginPath();
-  context.arc(x, y, 12 * scale, 0, 2 * Math.PI);
+  context.arc(x, y, 14 * scale, 0, 2 * Math.PI);
   context.stroke();
   context.lineWidth = scale;
   context.setLineDash([3 * scale, 4 * scale]);
   context.beginPath();
   context.moveTo(x, top);
-  context.lineTo(x, y - 12 * scale);
-  context.moveTo(x, y + 12 * scale);
+  context.lineTo(x, y - 14 * scale);
+  context.moveTo(x, y + 14 * scale);
   context.lineTo(x, top + height);
   context.stroke();
 }

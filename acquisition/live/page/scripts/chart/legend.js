@@ -73,8 +73,8 @@ function note(scan, curves) {
   const flagged = points.filter(isFlagged).length;
   const total = scan.run?.points ?? points.length;
   const counts = `${points.length} of ${count(total, 'point')} measured, ${flagged || 'none'} flagged.`;
-  const outside = points.some((p) => p.value === null)
-    ? ' Flagged points without a value stand at the lower edge.'
+  const outside = flagged
+    ? ' Flagged points without a value, or beyond the axis, stand at its edge.'
     : '';
   return `${counts}${outside} Error bars: standard uncertainty u (k = 1), often smaller than the symbols.`;
 }
