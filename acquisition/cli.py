@@ -211,6 +211,21 @@ def report(folder: RunFolder, json: Json = False) -> None:
 
 
 @app.command()
+def watch(
+    folder: RunFolder,
+    port: Annotated[int, typer.Option(help="Port of this computer. Default: a free one.")] = 0,
+) -> None:
+    """Show a run in the browser, as it grows or afterwards, until Ctrl-C.
+
+    Prints the address of the page, which only this computer reaches. Pause, Resume and Abort are
+    there while the scan runs.
+    """
+    from acquisition.live.watch import watch_run
+
+    watch_run(folder, port)
+
+
+@app.command()
 def devices(
     rig: RigOnly = None,
     identify: Annotated[

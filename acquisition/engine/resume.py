@@ -11,7 +11,7 @@ from acquisition.interlocks.lamp_checks import compared, doubtful_steps
 from acquisition.measure.drift import is_usable
 from acquisition.plan.plan import Plan, Step
 from instrument.config.rig import Rig
-from instrument.record.reading import Check, Reading
+from instrument.record.reading import Check, Reading, Rows
 from instrument.record.record import Record
 
 log = logging.getLogger(__name__)
@@ -31,9 +31,13 @@ class Progress:
     @classmethod
     def of(cls, record: Record) -> Progress:
         """Return the progress of the scan in a record."""
-        readings = tuple(record.readings())
-        doubted = doubted_steps(readings, record.events())
-        return cls(readings, tuple(record.checks()), doubted)
+        return cls.of_rows(record.rows())
+
+    @classmethod
+    def of_rows(cls, rows: Rows) -> Progress:
+        """Return the progress of the scan in rows of a record."""
+        doubted = doubted_steps(rows.readings, rows.events)
+        return cls(tuple(rows.readings), tuple(rows.checks), doubted)
 
     @property
     def doubtful(self) -> frozenset[int]:

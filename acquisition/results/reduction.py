@@ -32,7 +32,7 @@ from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
 from instrument.errors import AllFlagged, NoMeasurement, NotDetermined
 from instrument.geometry import BoolArray, FloatArray
-from instrument.record.reading import Check, Reading
+from instrument.record.reading import Check, Reading, Rows
 from instrument.record.record import Record
 
 # Components of uncertainty, and flags of points, as files and reports call them.
@@ -121,11 +121,16 @@ def root_sum_square(parts: Sequence[FloatArray]) -> FloatArray:
 
 def reduced_run(record: Record, loaded: Loaded) -> Reduced:
     """Return radiance and BRDF of all points in a run's record, complete or not."""
-    readings = record.readings()
-    doubted = doubted_steps(readings, record.events())
+    return reduced_rows(record.rows(), loaded)
+
+
+def reduced_rows(rows: Rows, loaded: Loaded) -> Reduced:
+    """Return radiance and BRDF of all points in rows of a record, complete or not."""
+    readings = rows.readings
+    doubted = doubted_steps(readings, rows.events)
     stray = stray_light(readings, loaded.rig)
     own = readings if stray is None else stray.subtracted(readings)
-    reduced = reduce(own, loaded.protocol, record.checks(), doubted)
+    reduced = reduce(own, loaded.protocol, rows.checks, doubted)
     if stray is not None:
         errors = _stray_light_errors(reduced.points, _tile_readings(own), stray)
         reduced = replace(reduced, shared=(*reduced.shared, *errors))

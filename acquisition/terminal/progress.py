@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from acquisition.plan.plan import Plan, Step
+from acquisition.plan.step_count import StepCount
 from acquisition.terminal.console import console, duration_text
 
 QUIET_S = 2.0  # what is done sooner needs no sign of life
@@ -25,37 +26,18 @@ def scan_progress(plan: Plan, done: frozenset[int]) -> Iterator[OnStep]:
 
     `done`: indices of the steps accepted before, by the run that is being resumed.
     """
-    counted = _Counted(plan, done)
+    counted = StepCount(plan, done)
     if console.is_interactive:
         with _bar(counted) as on_step:
             yield on_step
     else:
-        yield lambda step: _print(counted.line(step))
+        yield lambda step: _print(_line(counted, step))
 
 
-class _Counted:
-    """Count and planned time of the accepted steps."""
-
-    def __init__(self, plan: Plan, done: frozenset[int]) -> None:
-        self.total, self.accepted = len(plan.steps), len(done)
-        self.planned_s = sum(step.duration_s for step in plan.steps)
-        self.accepted_s = sum(step.duration_s for step in plan.steps if step.index in done)
-
-    @property
-    def text(self) -> str:
-        """Accepted steps of all."""
-        return f"{self.accepted}/{self.total}"
-
-    def add(self, step: Step) -> None:
-        """Count an accepted step."""
-        self.accepted += 1
-        self.accepted_s += step.duration_s
-
-    def line(self, step: Step) -> str:
-        """Count an accepted step and return its line in a log."""
-        self.add(step)
-        left = duration_text(max(self.planned_s - self.accepted_s, 0.0))
-        return f"{self.text} {_step_text(step)}, {left} left"
+def _line(counted: StepCount, step: Step) -> str:
+    """Count an accepted step and return its line in a log."""
+    counted.add(step)
+    return f"{counted.text} {_step_text(step)}, {duration_text(counted.left_s)} left"
 
 
 def _print(line: str) -> None:
@@ -63,7 +45,7 @@ def _print(line: str) -> None:
 
 
 @contextmanager
-def _bar(counted: _Counted) -> Iterator[OnStep]:
+def _bar(counted: StepCount) -> Iterator[OnStep]:
     """Show a bar over the planned time."""
     pose, count = TextColumn("{task.description:30}"), TextColumn("{task.fields[count]}")
     left = (TextColumn("time left"), TimeRemainingColumn(compact=True))

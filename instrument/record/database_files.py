@@ -117,3 +117,19 @@ def path_of(file: os.stat_result) -> Path | None:
     """
     number = _descriptor(file)
     return None if number is None else Path(f"/proc/self/fd/{number}").readlink()
+
+
+def absence_text(now: Path | None) -> str:
+    """Explain why the record's file is no longer where it was; `now`: its path, if it has one."""
+    if now is None or not now.is_file():
+        return "was removed while the scan ran, and the readings with it: run again"
+    return "was moved while the scan ran: nothing accepted is lost"
+
+
+def no_record_text(path: Path, file: str) -> str:
+    """Return that a path is no run's folder, and which one may be meant."""
+    if (path.parent / file).is_file():
+        return f"is a file of a run; name the run's folder: {path.parent}"
+    if path.is_file():
+        return "is a file; name the folder of a run"
+    return f"no {file} there: name the folder of a run"

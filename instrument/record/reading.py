@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from instrument.devices import Surface
 
@@ -98,3 +99,11 @@ class Preview:
     caption: str
     png: bytes
     polygon: list[list[float]]
+
+
+class Rows(NamedTuple):
+    """Readings, drift checks at resumes, and events (time, kind, text) of a record, in order."""
+
+    readings: Sequence[Reading]
+    checks: Sequence[Check]
+    events: Sequence[tuple[str, str, str]]

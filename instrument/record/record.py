@@ -22,12 +22,14 @@ from instrument.devices import Frame
 from instrument.errors import GonioError, InputError, StorageError
 from instrument.record.database_files import (
     SideFiles,
+    absence_text,
     create_file,
+    no_record_text,
     path_of,
     remove_database,
 )
 from instrument.record.folder_lock import FolderLock
-from instrument.record.reading import Check, Preview, Reading
+from instrument.record.reading import Check, Preview, Reading, Rows
 from instrument.record.schema import (
     SCHEMA_VERSION,
     connect,
@@ -43,7 +45,7 @@ from instrument.record.write_thread import WriteThread
 from instrument.text.atomic_file import disk_full, explain_os_error, make_folder, sync_folder
 
 FILE_NAME = "record.sqlite"
-Rows = Sequence[Sequence[object]]
+_NewRows = Sequence[Sequence[object]]
 _READING = [field.name for field in fields(Reading)]
 _SAVED = "the accepted readings have been moved into the database and are safe"
 _LOST = "the latest readings, which only it held, are lost and have to be measured again"
@@ -96,7 +98,7 @@ class Record(Closeable):
         require_support(folder)
         path = folder / FILE_NAME
         if not path.is_file():
-            raise InputError(f"{folder}: {_no_run(folder)}")
+            raise InputError(f"{folder}: {no_record_text(folder, FILE_NAME)}")
         with ExitStack() as on_failure:
             lock = on_failure.enter_context(FolderLock(folder)) if claim else None
             check_files(folder, FILE_NAME)
@@ -130,6 +132,19 @@ class Record(Closeable):
         """Return the folder that holds the record's file now, even if moved; None if removed."""
         found = path_of(self._file)
         return found.parent if found is not None and found.is_file() else None
+
+    def version(self) -> int:
+        """Return a number that changes once somebody else has changed the record."""
+        (number,) = self._db.execute("PRAGMA data_version").fetchone()
+        return int(number)
+
+    def rows(self) -> Rows:
+        """Return readings, checks and events of one moment, whatever is written meanwhile."""
+        self._db.execute("BEGIN")
+        try:
+            return Rows(self.readings(), self.checks(), list(self.events()))
+        finally:
+            self._db.rollback()
 
     def meta(self, key: str) -> str | None:
         """Return one entry of the run's description, None if there is none."""
@@ -174,7 +189,7 @@ class Record(Closeable):
         step, again = reading.step, reading.step in self._replaceable
         pairs = enumerate(zip(frames, names, strict=True))
         rows = [(step, n, f.exposure_s, f.time_s, f.device_time_s, name) for n, (f, name) in pairs]
-        tables: dict[str, Rows] = {"frame": rows, "reading": [astuple(reading)]}
+        tables: dict[str, _NewRows] = {"frame": rows, "reading": [astuple(reading)]}
         if preview is not None:
             row = (preview.step, preview.caption, preview.png, json.dumps(preview.polygon))
             tables["preview"] = [row]
@@ -266,7 +281,7 @@ class Record(Closeable):
         """Return the columns of a table in the record's version, its seal apart."""
         return [column.name for column in tables_of(self._version)[table]]
 
-    def _write(self, tables: Mapping[str, Rows], *, replace: bool = False) -> None:
+    def _write(self, tables: Mapping[str, _NewRows], *, replace: bool = False) -> None:
         """Insert rows into tables in one transaction."""
 
         def write() -> None:
@@ -276,7 +291,7 @@ class Record(Closeable):
 
         self.writing.run(write)
 
-    def _insert(self, table: str, rows: Rows, *, replace: bool) -> None:
+    def _insert(self, table: str, rows: _NewRows, *, replace: bool) -> None:
         """Insert rows in the transaction that is open, sealed if the record's version has seals."""
         seals = has_seals(self._version)
         count = len(self._names(table))
@@ -308,7 +323,7 @@ class Record(Closeable):
         except OSError:
             same = False
         if not same:
-            raise StorageError(f"{path}: {_absence(path_of(self._file))}")
+            raise StorageError(f"{path}: {absence_text(path_of(self._file))}")
         loss = self._side_files.loss()
         if loss:
             whole = self._side_files.save(self._db)
@@ -331,13 +346,6 @@ def _refusal(error: Exception, path: Path) -> GonioError:
     if isinstance(error, sqlite3.Error) and _name_of(error).startswith(_NOT_PERMITTED):
         return StorageError(f"{path}: {_explain(error, path.parent)}")
     return InputError(f"{path}: not a record of this program: {error}")
-
-
-def _absence(now: Path | None) -> str:
-    """Explain why the record's file is no longer where it was; `now`: its path, if it has one."""
-    if now is None or not now.is_file():
-        return "was removed while the scan ran, and the readings with it: run again"
-    return "was moved while the scan ran: nothing accepted is lost"
 
 
 def _created(
@@ -383,15 +391,6 @@ def _explain(error: OSError | sqlite3.Error, folder: Path) -> str:
     if name.startswith(_NOT_PERMITTED):
         return f"cannot be written ({error}): look at the folder's permissions and its disk"
     return f"cannot be written ({error}): look at the disk"
-
-
-def _no_run(path: Path) -> str:
-    """Return that a path is no run's folder, and which one may be meant."""
-    if (path.parent / FILE_NAME).is_file():
-        return f"is a file of a run; name the run's folder: {path.parent}"
-    if path.is_file():
-        return "is a file; name the folder of a run"
-    return f"no {FILE_NAME} there: name the folder of a run"
 
 
 def _reading(row: Iterable[Any]) -> Reading:

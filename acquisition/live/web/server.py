@@ -1,0 +1,43 @@
+"""Server of the live page: uvicorn in a thread, at an address of this computer alone."""
+
+from __future__ import annotations
+
+import socket
+import threading
+
+import uvicorn
+from starlette.types import ASGIApp
+
+from instrument.closeable import Closeable
+
+_MOST_CONNECTIONS = 64
+_LAST_ANSWERS_S = 1  # for browsers that do not read, at the end
+
+
+class WebServer(Closeable):
+    """Server of an application at a socket that listens, which it closes at its end."""
+
+    def __init__(self, app: ASGIApp, listener: socket.socket) -> None:
+        config = uvicorn.Config(
+            app,
+            loop="asyncio",
+            http="h11",
+            ws="none",
+            lifespan="off",
+            log_config=None,
+            access_log=False,  # it would hold the token
+            proxy_headers=False,
+            server_header=False,
+            limit_concurrency=_MOST_CONNECTIONS,
+            timeout_graceful_shutdown=_LAST_ANSWERS_S,
+        )
+        self._server = uvicorn.Server(config)
+        self._thread = threading.Thread(
+            target=self._server.run, args=([listener],), name="web", daemon=True
+        )
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the server once its answers are sent, or cannot be; may be called twice."""
+        self._server.should_exit = True
+        self._thread.join()

@@ -1,0 +1,61 @@
+"""Runs for the live page: a scan of few points with small pictures, as far as a test wants it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from acquisition.plan.plan import make_plan
+from acquisition.results.run_folder import run_meta, write_run_inputs
+from instrument.config.load import Loaded, load_protocol
+from instrument.record.event_kinds import FINISHED
+from instrument.record.record import Record
+from tests.support.paths import CONFIGS
+from tests.support.whole_scans.stopped_scan import scan
+
+_SHRINK = 5
+
+
+def live_protocol(folder: Path, *, tile: bool = True, keep_frames: bool = False) -> Loaded:
+    """Two incidences of five views on the bench, with 1/5 of its camera's rows and columns."""
+    rig = (CONFIGS / "rigs" / "bench_12bit.yaml").read_text()
+    for name in ("width_px", "height_px", "axis_row_px", "axis_column_px"):
+        rig = re.sub(rf"({name}: )([\d.]+)", _shrunk, rig)
+    (folder / "small_rig.yaml").write_text(rig)
+    text = (CONFIGS / "protocols" / "demo.yaml").read_text()
+    text = text.replace("[30.0, 45.0, 60.0]", "[30.0, 60.0]").replace("num: 33", "num: 5")
+    text = text.replace("../rigs/bench_12bit.yaml", "small_rig.yaml")
+    text = text.replace("every_points: 25", "every_points: 4")
+    if not tile:
+        text = re.sub(r"  white_tile: .*\n", "", text)
+    if keep_frames:
+        text += "keep_frames: true\n"
+    text += "fit: {models: [lambert, oren_nayar]}\n"
+    (folder / "small.yaml").write_text(text)
+    return load_protocol(folder / "small.yaml")
+
+
+def _shrunk(found: re.Match[str]) -> str:
+    number = float(found[2]) / _SHRINK
+    return f"{found[1]}{number if '.' in found[2] else int(number)}"
+
+
+@contextmanager
+def begun_run(loaded: Loaded, folder: Path) -> Iterator[Record]:
+    """Folder and record of a scan that has begun, locked as a scan does."""
+    with (
+        Record.create(folder, run_meta(loaded, make_plan(loaded))) as record,
+        record.claimed(),
+    ):
+        write_run_inputs(record)
+        yield record
+
+
+def whole_run(loaded: Loaded, folder: Path) -> Path:
+    """A run that has ended."""
+    with begun_run(loaded, folder) as record:
+        scan(loaded, record)
+        record.add_event("2026-11-28T05:00:00+00:00", FINISHED, "all steps")
+    return folder
