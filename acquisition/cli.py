@@ -266,11 +266,17 @@ def move(
 @app.command()
 def grab(
     out: Annotated[
-        Path,
+        Path | None,
         typer.Option(
             "--out", "-o", help="File: .png (8 bit, with the window) or .tiff (raw counts)."
         ),
-    ],
+    ] = None,
+    live: Annotated[
+        bool,
+        typer.Option(
+            "--live", help="Show the picture in a browser, with focus and saturation, until Ctrl-C."
+        ),
+    ] = False,
     rig: RigOnly = None,
     protocol: Annotated[
         Path | None, typer.Option(help="Take rig and measuring window from this protocol.")
@@ -283,10 +289,16 @@ def grab(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Take one frame with the measuring window drawn on it, for aiming. Nothing moves."""
-    from acquisition.commands.grab import grab_frame
+    """Take one frame with the measuring window drawn on it, for aiming. Nothing moves.
 
-    grab_frame(out, rig, protocol, theta_r_deg=theta_r_deg, exposure_s=exposure_s, as_json=json)
+    With --live the picture is shown in a browser while the camera is aimed and the lens turned.
+    """
+    from acquisition.commands.grab import aim_camera, grab_frame
+
+    if live:
+        aim_camera(rig, protocol, theta_r_deg=theta_r_deg, exposure_s=exposure_s)
+    else:
+        grab_frame(out, rig, protocol, theta_r_deg=theta_r_deg, exposure_s=exposure_s, as_json=json)
 
 
 @app.command()

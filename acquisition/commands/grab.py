@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from acquisition.commands.setup import require_rig
 from acquisition.engine.exposure.search import ExposureSearch
+from acquisition.live.aiming import Aiming
+from acquisition.live.channel import user_folder
+from acquisition.live.publisher import Publisher
 from acquisition.measure.window import Window, window_at
 from acquisition.plan.exposure_ladder import longest_exposure_s
 from acquisition.results.model_check import check_model
 from acquisition.rig import OpenRig, restart_for_emulated_camera
 from acquisition.terminal.console import console, out
 from acquisition.terminal.orderly_end import orderly_end
+from instrument.clock import SystemClock
 from instrument.config.load import load_protocol
 from instrument.config.protocol import PatchConfig
 from instrument.config.rig import Rig
@@ -32,7 +39,7 @@ _DIM = 0.05  # of full scale: a window below it is nearly dark
 
 
 def grab_frame(
-    path: Path,
+    path: Path | None,
     rig_path: Path | None,
     protocol_path: Path | None,
     *,
@@ -44,18 +51,14 @@ def grab_frame(
 
     Nothing moves: `theta_r_deg` is the camera's present angle, for the outline of the window.
     """
+    if path is None:
+        raise InputError("gonio grab: name a file with --out, or aim in a browser with --live")
     if path.suffix.lower() not in (".png", ".tif", ".tiff"):
         raise InputError(f"{path}: --out must end in .png (8 bit, drawn on) or .tiff (raw counts)")
-    rig, patch, target = _rig_and_patch(rig_path, protocol_path)
-    low, high = rig.camera.min_exposure_s, rig.camera.max_exposure_s
-    if exposure_s is not None and not low <= exposure_s <= high:
-        raise InputError(f"--exposure-s: {exposure_s:g} s; the camera can do {low:g} to {high:g} s")
-    window = window_at(theta_r_deg, Pinhole.of(rig), patch.width_mm, patch.height_mm)
-    restart_for_emulated_camera(rig)
-    with orderly_end(), OpenRig(rig) as open_rig:
-        open_rig.pose_scene(theta_r_deg)
-        camera = open_rig.camera()
-        frame, identity = _frame(camera, rig, window, target, exposure_s), camera.identity()
+    aimed = Aimed.of(rig_path, protocol_path, theta_r_deg, exposure_s)
+    with aimed.camera() as camera, orderly_end():
+        frame, identity = aimed.frame(camera), camera.identity()
+    rig, window = aimed.rig, aimed.window
     with orderly_end():  # no half-written file stays
         write_whole(path, _encoded(frame, window, rig, path.suffix))
     statistics = _statistics(frame, window, rig)
@@ -64,15 +67,88 @@ def grab_frame(
         console.print(f"warning: {warning}", highlight=False, soft_wrap=True)
 
 
-def _frame(
-    camera: Camera, rig: Rig, window: Window, target: float, exposure_s: float | None
-) -> Frame:
-    """Take one frame, at the exposure that suits the window if none is given."""
-    if exposure_s is not None:
-        camera.set_exposure_s(exposure_s)
-        return camera.grab(1)[0]
-    first_s = longest_exposure_s(_FIRST_EXPOSURE_S, rig.camera)
-    return ExposureSearch(camera, rig.camera, target).frames(first_s, window)[-1]
+def aim_camera(
+    rig_path: Path | None,
+    protocol_path: Path | None,
+    *,
+    theta_r_deg: float,
+    exposure_s: float | None,
+) -> None:
+    """Show the camera's picture in a browser, with a measure of focus, until Ctrl-C.
+
+    Nothing moves, and no file is written.
+    """
+    from acquisition.live.page_process import live_page
+
+    aimed = Aimed.of(rig_path, protocol_path, theta_r_deg, exposure_s)
+    channel = user_folder() / f"aim-{os.getpid()}"
+    with (
+        suppress(KeyboardInterrupt),
+        orderly_end(),
+        aimed.camera() as camera,
+        live_page(channel, aiming=True) as address,
+    ):
+        out.print(f"{address}\nCtrl-C ends it", highlight=False, soft_wrap=True)
+        Aiming(
+            publisher=Publisher(channel, aimed.rig.camera),
+            camera=aimed.rig.camera,
+            window=aimed.window,
+            take=lambda: aimed.frame(camera),
+            clock=SystemClock(),
+        ).run()
+
+
+@dataclass(slots=True)
+class Aimed:
+    """Rig whose camera is aimed, the window at its present angle, and the exposure.
+
+    `target` of the exposure is a share of full scale, where no `exposure_s` is given.
+    """
+
+    rig: Rig
+    window: Window
+    theta_r_deg: float
+    target: float
+    exposure_s: float | None
+    _last_s: float = _FIRST_EXPOSURE_S
+
+    @classmethod
+    def of(
+        cls,
+        rig_path: Path | None,
+        protocol_path: Path | None,
+        theta_r_deg: float,
+        exposure_s: float | None,
+    ) -> Aimed:
+        """Read the files; raise `InputError` before the camera is opened."""
+        rig, patch, target = _rig_and_patch(rig_path, protocol_path)
+        low, high = rig.camera.min_exposure_s, rig.camera.max_exposure_s
+        if exposure_s is not None and not low <= exposure_s <= high:
+            raise InputError(
+                f"--exposure-s: {exposure_s:g} s; the camera can do {low:g} to {high:g} s"
+            )
+        window = window_at(theta_r_deg, Pinhole.of(rig), patch.width_mm, patch.height_mm)
+        return cls(rig, window, theta_r_deg, target, exposure_s)
+
+    @contextmanager
+    def camera(self) -> Iterator[Camera]:
+        """Open the camera in a `with` block."""
+        restart_for_emulated_camera(self.rig)
+        with orderly_end(), OpenRig(self.rig) as open_rig:
+            open_rig.pose_scene(self.theta_r_deg)
+            yield open_rig.camera()
+
+    def frame(self, camera: Camera) -> Frame:
+        """Take one frame, at the exposure that suits the window if none is given."""
+        if self.exposure_s is not None:
+            camera.set_exposure_s(self.exposure_s)
+            return camera.grab(1)[0]
+        first_s = longest_exposure_s(self._last_s, self.rig.camera)
+        frame = ExposureSearch(camera, self.rig.camera, self.target).frames(first_s, self.window)[
+            -1
+        ]
+        self._last_s = frame.exposure_s
+        return frame
 
 
 def _warnings(statistics: dict[str, float], rig: Rig) -> Iterator[str]:

@@ -21,6 +21,7 @@ _VARIANCES = np.geomspace(0.05**2, 0.9**2, 60)
 _LEVELS = np.linspace(-1.0, 1.0, 801)  # in DN
 _TERMS = np.arange(1, 21)
 _FAR_DN = 1.5  # from the median: a defective pixel, which says nothing about the noise of others
+_ENOUGH = 1000  # pixels for that median: it is off by a hundredth of a count
 
 
 def rounding_u_dn(noise_variance_dn2: float) -> float:
@@ -59,14 +60,18 @@ def dark_rounding_dn(
     differ in offset that need not be so: the part of their differences in the spread of all counts
     is taken of the error that the noise of one pixel would leave.
     """
-    near = weights > 0
-    near &= np.abs(mean - np.median(mean[near])) < _FAR_DN if near.any() else near
+    inside = weights > 0
+    level_of, variance_of, part = mean[inside], variance[inside], weights[inside]
+    typical = np.median(level_of[:: max(1, level_of.size // _ENOUGH)]) if level_of.size else 0.0
+    near = np.abs(level_of - typical) < _FAR_DN
     if not near.any():
         return 0.0, 0.0
-    part = weights[near] / weights[near].sum()
-    level = float(part @ mean[near])
-    between = float(part @ np.square(mean[near] - level))
-    temporal = float(part @ variance[near])
+    if not near.all():
+        level_of, variance_of, part = level_of[near], variance_of[near], part[near]
+    part = part / part.sum()
+    level = float(part @ level_of)
+    between = float(part @ np.square(level_of - level))
+    temporal = float(part @ variance_of)
     total = between + temporal * (frames - 1) / frames
     if total > 1.0:
         return 0.0, 0.0
