@@ -63,6 +63,9 @@ OutFolder = Annotated[
     ),
 ]
 Yes = Annotated[bool, typer.Option("--yes", help="The rig is clear and may move: do not ask.")]
+Live = Annotated[
+    bool, typer.Option("--live", help="Show the scan in a browser; prints the page's address.")
+]
 AxisName = Annotated[
     str,
     typer.Argument(help="theta_i, dphi or theta_r.", autocompletion=_among(_AXES)),
@@ -92,12 +95,19 @@ def common(
 
 @app.command()
 def run(
-    protocol: ProtocolFile, rig: RigFile = None, out: OutFolder = None, json: Json = False
+    protocol: ProtocolFile,
+    rig: RigFile = None,
+    out: OutFolder = None,
+    live: Live = False,
+    json: Json = False,
 ) -> None:
-    """Run a scan from a protocol: measure, fit and report."""
+    """Run a scan from a protocol: measure, fit and report.
+
+    In a terminal, the key p pauses the scan and lets it go on.
+    """
     from acquisition.commands.scan import run_protocol
 
-    run_protocol(protocol, rig, out, as_json=json)
+    run_protocol(protocol, rig, out, live=live, as_json=json)
 
 
 @app.command()
@@ -109,11 +119,11 @@ def plan(protocol: ProtocolFile, rig: RigFile = None, json: Json = False) -> Non
 
 
 @app.command()
-def resume(folder: RunFolder, yes: Yes = False, json: Json = False) -> None:
+def resume(folder: RunFolder, yes: Yes = False, live: Live = False, json: Json = False) -> None:
     """Resume a stopped run at the first geometry that is missing in its record."""
     from acquisition.commands.scan import resume_run
 
-    resume_run(folder, yes=yes, as_json=json)
+    resume_run(folder, yes=yes, live=live, as_json=json)
 
 
 @app.command()

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,6 +16,7 @@ from acquisition.commands.scan_session import scan
 from acquisition.commands.views import print_outcome, print_plan
 from acquisition.engine.frame_files import require_disk_space, require_own_folder
 from acquisition.engine.resume import Progress
+from acquisition.live.page_process import live_page, require_libraries
 from acquisition.plan.moves import moves_between
 from acquisition.plan.plan import Plan, make_plan
 from acquisition.plan.pose import home_pose
@@ -44,24 +46,33 @@ _STATES = (FAULT, STOPPED, RESUMED, FINISHED)
 
 
 def run_protocol(
-    protocol_path: Path, rig_path: Path | None, out: Path | None, as_json: bool
+    protocol_path: Path,
+    rig_path: Path | None,
+    out: Path | None,
+    *,
+    as_json: bool,
+    live: bool = False,
 ) -> None:
-    """Plan, scan, fit and report.
+    """Plan, scan, fit and report; `live`: with a page in the browser.
 
     Raises `InputError` before anything moves; `DeviceError`, `StorageError` or `OperatorStop` where
     the scan ends early.
     """
     loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
-    scan_into(loaded, out, lambda record: _finish(record, loaded, as_json))
+    scan_into(loaded, out, lambda record: _finish(record, loaded, as_json), live=live)
 
 
-def scan_into(loaded: Loaded, out: Path | None, finish: Callable[[Record], object]) -> Path:
+def scan_into(
+    loaded: Loaded, out: Path | None, finish: Callable[[Record], object], *, live: bool = False
+) -> Path:
     """Plan and scan into a new folder, then call `finish` with the complete record.
 
-    Returns the folder: `out`, or one named after the protocol and the time. Raises as
-    `run_protocol` does, and what `finish` raises.
+    `live`: show it in a browser meanwhile. Returns the folder: `out`, or one named after the
+    protocol and the time. Raises as `run_protocol` does, and what `finish` raises.
     """
     plan = make_plan(loaded)
+    if live:
+        require_libraries()
     require_dated(loaded)
     check_ready(loaded)
     folder = out if out is not None else default_folder(loaded)
@@ -72,16 +83,30 @@ def scan_into(loaded: Loaded, out: Path | None, finish: Callable[[Record], objec
         record.claimed(),
     ):
         write_run_inputs(record)
-        scan(loaded, plan, record)
-        finish(record)
+        with _shown(record, live):
+            scan(loaded, plan, record)
+            finish(record)
     return folder
 
 
-def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
+@contextmanager
+def _shown(record: Record, live: bool) -> Iterator[None]:
+    """Show a run in the browser within a `with` block, if that is wanted."""
+    if not live:
+        yield
+        return
+    with live_page(record.folder) as address:
+        console.print(f"live page: {address}", highlight=False, soft_wrap=True)
+        yield
+
+
+def resume_run(folder: Path, *, yes: bool, as_json: bool, live: bool = False) -> None:
     """Measure what is missing of a stopped run, then fit and report; a complete run is only fitted.
 
-    `yes`: the rig may move, without asking the operator.
+    `yes`: the rig may move, without asking the operator. `live`: with a page in the browser.
     """
+    if live:
+        require_libraries()
     with orderly_end(), Record.open(folder, claim=True) as record:
         write_run_inputs(record)
         loaded = load_run_inputs(record)
@@ -95,8 +120,10 @@ def resume_run(folder: Path, yes: bool, as_json: bool) -> None:
             require_own_folder(loaded, folder)
             _confirm(yes, len(missing), record)
             _remove_damaged(record)
-            scan(loaded, plan, record, progress)
-        _finish(record, loaded, as_json)
+        with _shown(record, live):
+            if missing:
+                scan(loaded, plan, record, progress)
+            _finish(record, loaded, as_json)
 
 
 def report_run(folder: Path, as_json: bool) -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import time
+from contextlib import ExitStack
 from pathlib import Path
 
 from tests.support.paths import ROOT
-from tests.support.timing.standstill import TRIES
+from tests.support.timing.deadline import wait_for
+from tests.support.timing.standstill import STARVED_S, TRIES, Standstills, waited_s
 
 CONFTEST = """
 import pytest
@@ -81,6 +85,43 @@ def test_passes_in_a_standstill():
     stand_still()
 """
 NAMES = ("twice", "short", "shared", "always", "passes")
+
+
+# One processor, of which the others leave the last next to nothing (sched(7): SCHED_IDLE).
+SPIN = """
+import os, sys, time
+os.sched_setaffinity(0, {int(sys.argv[1])})
+if sys.argv[2] == "starved":
+    os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+print(flush=True)
+while time.monotonic() < float(sys.argv[3]):
+    pass
+"""
+
+
+def test_a_process_of_the_test_that_is_kept_from_running_is_a_standstill() -> None:
+    """The test's own thread, which sleeps, notices nothing of it."""
+    processor, until_s = str(min(os.sched_getaffinity(0))), str(time.monotonic() + 3.0)
+    with Standstills() as standstills, ExitStack() as stack:
+        for kind in ("busy", "busy", "starved"):
+            command = [sys.executable, "-c", SPIN, processor, kind, until_s]
+            child = stack.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE))
+            stack.callback(child.kill)
+        wait_for(lambda: standstills.starved_s > STARVED_S, "a starved process")
+    assert standstills.cause
+
+
+def test_a_process_that_sleeps_or_waits_is_none() -> None:
+    child = [sys.executable, "-c", "import sys; print(flush=True); sys.stdin.read()"]
+    with subprocess.Popen(child, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as sleeping:
+        assert sleeping.stdout is not None
+        sleeping.stdout.readline()
+        waited = waited_s(os.getpid())
+        assert sleeping.pid in waited
+        with Standstills() as standstills:
+            wait_for(lambda: len(standstills.looks) > 3, "looks at the processes")
+        assert waited_s(os.getpid())[sleeping.pid] - waited[sleeping.pid] < STARVED_S / 2
+        sleeping.kill()
 
 
 def test_a_failure_in_a_standstill_is_repeated_and_any_other_counts(tmp_path: Path) -> None:

@@ -3,15 +3,20 @@
 Emulated controllers answer within the real ones' times, and drivers have the real time-outs. Where
 the test process gets no processor for longer than that, both miss theirs, and a failure says
 nothing about the program. A thread measures such standstills, one long one or many short ones in a
-row; a test in real time that failed in one is repeated, and the summary of the test run says so. A
-failure without a standstill counts.
+row. It sleeps most of the time, and so is served before one that computes: for processes that the
+test started, the kernel's own count tells how long their threads were ready to run and did not.
+A test in real time that failed in a standstill is repeated, and the summary of the test run says
+so. A failure without one counts.
 """
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections import deque
+from contextlib import suppress
+from pathlib import Path
 from types import TracebackType
 
 import pytest
@@ -22,18 +27,23 @@ TRIES = 4
 STANDSTILL_S = 0.05  # a third of the shortest time-out of a reply
 # Short ones in a row: a fifth of the time for which a moving stage may be silent.
 LATE_S, WITHIN_S = 0.1, 0.5
-_TICK_S = 0.01
+# Of WITHIN_S, for a thread of a process of the test: two busy programs leave it half of the time.
+STARVED_S = 0.3
+_TICK_S, _LOOK_S = 0.01, 0.1  # of the own thread; between two looks at other processes
 _PROPERTY = "repeated"
 
 
 class Standstills:
     """Delays of a thread that wakes every 10 ms, within a `with` block.
 
-    longest_s: the longest. late_s: the largest sum of those within WITHIN_S.
+    longest_s: the longest. late_s: the largest sum of those within WITHIN_S. starved_s: the longest
+    time within WITHIN_S for which a thread of a child process was kept from running. looks: the
+    last looks at those threads.
     """
 
     def __init__(self) -> None:
-        self.longest_s = self.late_s = 0.0
+        self.longest_s = self.late_s = self.starved_s = 0.0
+        self.looks: deque[dict[int, float]] = deque(maxlen=1 + round(WITHIN_S / _LOOK_S))
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._measure, daemon=True, name="standstills")
 
@@ -53,6 +63,7 @@ class Standstills:
     def _measure(self) -> None:
         woken_s = time.monotonic()
         delays_s: deque[tuple[float, float]] = deque()
+        looked_s = woken_s
         while not self._done.wait(_TICK_S):
             now_s = time.monotonic()
             delay_s, woken_s = now_s - woken_s - _TICK_S, now_s
@@ -61,13 +72,49 @@ class Standstills:
             while delays_s[0][0] < now_s - WITHIN_S:
                 delays_s.popleft()
             self.late_s = max(self.late_s, sum(delay for _, delay in delays_s))
+            if now_s - looked_s >= _LOOK_S:
+                looked_s = now_s
+                self._look_at_children()
+
+    def _look_at_children(self) -> None:
+        self.looks.append(waited_s(os.getpid()))
+        first, last = self.looks[0], self.looks[-1]
+        more = [waited - first.get(thread, 0.0) for thread, waited in last.items()]
+        self.starved_s = max(self.starved_s, *more, 0.0)
 
     @property
     def cause(self) -> str:
         """What kept the test from running, empty if nothing did."""
         if self.longest_s > STANDSTILL_S:
             return f"{self.longest_s:.2f} s"
-        return f"{self.late_s:.2f} s of {WITHIN_S} s" if self.late_s > LATE_S else ""
+        if self.late_s > LATE_S:
+            return f"{self.late_s:.2f} s of {WITHIN_S} s"
+        starved = f"{self.starved_s:.2f} s of {WITHIN_S} s, in a process of the test"
+        return starved if self.starved_s > STARVED_S else ""
+
+
+def waited_s(process: int) -> dict[int, float]:
+    """Return how long each thread of a process's descendants was ready to run and did not, in s.
+
+    Second number of /proc/PID/task/TID/schedstat (Linux, sched-stats.rst), in ns.
+    """
+    found: dict[int, float] = {}
+    for child in _children(process):
+        for thread in Path(f"/proc/{child}/task").glob("*"):
+            with suppress(OSError):  # it has ended
+                waited = (thread / "schedstat").read_text().split()[1]
+                found[int(thread.name)] = 1e-9 * int(waited)
+        found |= waited_s(child)
+    return found
+
+
+def _children(process: int) -> list[int]:
+    """Return the numbers of the child processes; none where the kernel does not list them."""
+    found: list[int] = []
+    for thread in Path(f"/proc/{process}/task").glob("*"):
+        with suppress(OSError):
+            found += map(int, (thread / "children").read_text().split())
+    return found
 
 
 def is_repeated(item: pytest.Item) -> bool:

@@ -1,0 +1,93 @@
+"""Cost of the live page to a scan in real time, with a client that reads and one that stalls.
+
+The scan time of a point is the engine's own, without homing and darks: the difference between first
+and last reading over their number.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+from instrument.record.record import Record
+from tests.support.paths import CONFIGS, ROOT
+from tests.support.scans import small_demo
+
+pytest.importorskip("uvicorn", reason="the live page's libraries are not installed")
+pytestmark = [
+    pytest.mark.real_time,
+    pytest.mark.skipif(
+        shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"
+    ),
+]
+RIG = CONFIGS / "rigs" / "emulated.yaml"
+MOST = 1.02  # of the time of a scan that nobody watches
+MOST_OF_ONE = 1.15  # of one pair of short scans, whose camera has 30 frames a second
+
+
+@contextmanager
+def client(address: str, *, stalled: bool) -> Iterator[None]:
+    """Read the page's messages, or ask for them and read nothing."""
+    parts = urlsplit(address)
+    with socket.create_connection((parts.hostname, parts.port)) as line:
+        request = f"GET /events?{parts.query} HTTP/1.1\r\nHost: {parts.netloc}\r\n\r\n"
+        line.sendall(request.encode())
+        reader = threading.Thread(target=_read_all, args=(line,), daemon=True)
+        if not stalled:
+            reader.start()
+        yield
+        line.shutdown(socket.SHUT_RDWR)
+
+
+def _read_all(line: socket.socket) -> None:
+    try:
+        while line.recv(65536):
+            pass
+    except OSError:
+        return
+
+
+def time_a_point_s(folder: Path, protocol: Path, *, watched: bool) -> float:
+    """Scan, watched by two clients or by nobody; return the engine's time of a point in seconds."""
+    command = [sys.executable, "-m", "acquisition", "run", protocol, "--rig", RIG, "--out", folder]
+    with (
+        subprocess.Popen(
+            [*command, *["--live"] * watched], cwd=ROOT, stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        ) as scan,
+        ExitStack() as clients,
+    ):  # fmt: skip
+        assert scan.stderr is not None
+        said = ""
+        for text in scan.stderr:
+            said += text
+            found = re.search(r"live page: (\S+)", text)
+            for stalled in (False, True) if found else ():
+                clients.enter_context(client(str(found and found[1]), stalled=stalled))
+        assert scan.wait(120) == 0, said
+    assert ("live page" in said) == watched
+    with Record.open(folder) as record:
+        times = [reading.free_s for reading in record.readings()]
+    return (times[-1] - times[0]) / (len(times) - 1)
+
+
+def test_two_clients_one_of_them_stalled_cost_a_scan_no_time(tmp_path: Path, slow: bool) -> None:
+    """Measured: see the note of the change; in the slow form the medians of five pairs."""
+    protocol = small_demo(tmp_path)
+    pairs = [
+        [time_a_point_s(tmp_path / f"{n}{w}", protocol, watched=w) for w in (False, True)]
+        for n in range(5 if slow else 1)
+    ]
+    alone_s, watched_s = np.median(pairs, axis=0)
+    assert watched_s / alone_s < (MOST if slow else MOST_OF_ONE), pairs
