@@ -25,10 +25,11 @@ def main() -> None:
     """Serve the page until the standard input ends."""
     be_quiet()
     found = _arguments()
+    watched = found.run or found.aim
     listener = socket.socket(fileno=found.socket)
     token = sys.stdin.readline().strip()
     try:
-        with LivePage(found.run, listener, token) as page:
+        with LivePage(watched, listener, token, aiming=found.run is None) as page:
             sys.stdin.read()
             page.finish()
     except GonioError as error:
@@ -45,8 +46,9 @@ def be_quiet() -> None:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m acquisition.live", description=__doc__)
-    parser.add_argument("--run", type=Path, help="folder of the run")
-    parser.add_argument("--aim", type=Path, help="channel of a camera that is being aimed")
+    watched = parser.add_mutually_exclusive_group(required=True)
+    watched.add_argument("--run", type=Path, help="folder of the run")
+    watched.add_argument("--aim", type=Path, help="channel of a camera that is being aimed")
     parser.add_argument("--socket", type=int, required=True, help="number of the listening socket")
     return parser.parse_args()
 

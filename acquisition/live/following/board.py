@@ -18,12 +18,15 @@ from typing import Any, NamedTuple
 _MOST_STALE = 2  # entries in the order for each message, before it is cleared of replaced ones
 
 
+Content = Mapping[str, Any] | None
+
+
 class Message(NamedTuple):
     """Content of a key since change `number`, and the text of it as server-sent event."""
 
     number: int
     kind: str
-    data: Mapping[str, Any]
+    data: Content
     text: bytes
 
 
@@ -54,7 +57,7 @@ class Board:
         """True once nothing more will come."""
         return self._closed
 
-    def put(self, key: str, kind: str, data: Mapping[str, Any]) -> None:
+    def put(self, key: str, kind: str, data: Content) -> None:
         """Set the content of a key; nothing happens if it is what it was."""
         with self._lock:
             before = self._newest.get(key)
@@ -65,20 +68,10 @@ class Board:
             self._newest[key] = Message(self._number, kind, data, text)
             self._order.append((self._number, key))
             if len(self._order) > _MOST_STALE * len(self._newest) + 100:
-                self._order = [(n, k) for n, k in self._order if self._is_newest(n, k)]
+                self._order = [(n, k) for n, k in self._order if self._newest[k].number == n]
             readers = tuple(self._readers)
         for tell in readers:
             tell()
-
-    def remove(self, key: str) -> None:
-        """Keep nothing of a key for browsers that come later."""
-        with self._lock:
-            self._newest.pop(key, None)
-
-    def get(self, key: str) -> Mapping[str, Any] | None:
-        """Return the content of a key, None if it has none."""
-        message = self._newest.get(key)
-        return None if message is None else message.data
 
     def after(self, number: int, most_bytes: int) -> list[Message]:
         """Return what changed after a number, in order: at least one, then up to a size."""
@@ -86,9 +79,9 @@ class Board:
             found: list[Message] = []
             size = 0
             for n, key in self._order[bisect_right(self._order, (number, "\U0010ffff")) :]:
-                if not self._is_newest(n, key):
-                    continue
                 message = self._newest[key]
+                if message.number != n:
+                    continue
                 size += len(message.text)
                 if found and size > most_bytes:
                     break
@@ -120,12 +113,8 @@ class Board:
         for tell in tuple(self._readers):
             tell()
 
-    def _is_newest(self, number: int, key: str) -> bool:
-        message = self._newest.get(key)
-        return message is not None and message.number == number
 
-
-def _event_text(number: str, kind: str, data: Mapping[str, Any]) -> bytes:
+def _event_text(number: str, kind: str, data: Content) -> bytes:
     """Return a server-sent event (WHATWG HTML, section 9.2); JSON has no line end in it."""
     content = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     # A lone surrogate, as a damaged file name has, becomes the escape that JSON has for it.

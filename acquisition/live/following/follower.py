@@ -1,89 +1,43 @@
-"""Follower of a run: one thread that reads record and channel, and keeps the board up to date."""
+"""Follower: a thread that looks again and again, and keeps a board up to date."""
 
 from __future__ import annotations
 
-import sqlite3
 import threading
 import time
+from abc import abstractmethod
 
-from acquisition.engine.resume import Progress
-from acquisition.live.channel import channel_of
 from acquisition.live.following.board import Board
-from acquisition.live.following.curves import Curves
-from acquisition.live.following.messages import (
-    PointMessages,
-    event_contents,
-    rounded,
-    run_content,
-)
-from acquisition.live.following.model_thread import ModelThread
-from acquisition.live.following.run_reader import RunReader
-from acquisition.live.following.scan_end import ScanState, scan_state
 from acquisition.live.following.scan_watch import ScanWatch
-from acquisition.plan.plan import make_plan
-from acquisition.plan.step_count import StepCount
-from acquisition.results.reduction import reduced_rows
 from instrument.closeable import Closeable
-from instrument.errors import GonioError
-from instrument.record.reading import Rows
-from instrument.text.terminal_safe import escape_control_characters
 
 _EVERY_S, _UNWATCHED_S = 0.2, 1.0  # between two looks, with and without a browser
 _IDLE = 4.0  # time without work for each time of work: a long run takes longer to reduce
-_LAST_FIT_S = 2.0
-_EMPTY = Rows((), (), ())
 
 
-class RunFollower(Closeable):
-    """Follower of one run, complete or not. `poll` may be called in place of `start`."""
+class Follower(Closeable):
+    """Follower of what is measured; `scan` watches over the process that measures."""
 
-    def __init__(self, reader: RunReader, board: Board) -> None:
-        self._reader, self._board = reader, board
-        loaded = reader.loaded
-        self._plan = make_plan(loaded)
-        self._curves = Curves.of(self._plan)
-        steps = self._plan.steps
-        kept = loaded.protocol.keep_frames
-        pictures = frozenset(step.index for step in steps if kept or step.preview)
-        self._points = PointMessages(loaded, self._curves, pictures)
-        self._models = ModelThread(board, loaded, self._curves)
-        self._scan = ScanWatch(channel_of(reader.record_file), board)
-        self._rows, self._done, self._elapsed_s = _EMPTY, frozenset[int](), 0.0
-        self._count = StepCount(self._plan, self._done)
-        self._trouble, self._ended = "", threading.Event()
+    def __init__(self, scan: ScanWatch, board: Board) -> None:
+        self.scan, self._board = scan, board
+        self._ended = threading.Event()
         self._thread = threading.Thread(target=self._work, name="follower", daemon=True)
 
-    @property
-    def channel(self) -> ScanWatch:
-        """Watch over the scan of the run."""
-        return self._scan
-
-    def start(self) -> None:
-        """Follow the run in a thread, until `close`."""
-        self._thread.start()
-
+    @abstractmethod
     def poll(self) -> None:
         """Look once, and put on the board what is new."""
-        self._scan.poll()
-        try:
-            rows = self._reader.changed_rows()
-            if rows is not None:
-                self._trouble = ""
-                self._put_rows(rows)
-        except (GonioError, OSError, sqlite3.Error, ArithmeticError, ValueError) as error:
-            self._trouble = f"The record cannot be read: {error}"
-        self._put_state(ScanState("lost", self._trouble) if self._trouble else self._state())
+
+    def start(self) -> None:
+        """Look again and again in a thread, until `close`."""
+        self._thread.start()
 
     def finish(self) -> None:
-        """Look once more, and fit once more: the scan is over."""
+        """Look for the last time: what was measured is complete."""
         self._end_thread()
         self.poll()
-        self._models.finish(_LAST_FIT_S)
 
     def close(self) -> None:
-        """End the threads; may be called twice."""
+        """End the thread; may be called twice."""
         self._end_thread()
-        self._models.close()
 
     def _end_thread(self) -> None:
         self._ended.set()
@@ -97,41 +51,3 @@ class RunFollower(Closeable):
             self.poll()
             used_s = time.thread_time() - begun_s
             pause_s = max(_EVERY_S if self._board.readers else _UNWATCHED_S, _IDLE * used_s)
-
-    def _put_rows(self, rows: Rows) -> None:
-        reader, board = self._reader, self._board
-        folder = str(reader.folder or reader.record_file.parent)
-        content = run_content(reader.loaded, self._plan, self._curves, folder, reader.started_utc)
-        board.put("run", "run", content)
-        reduced = reduced_rows(rows, reader.loaded)
-        for step, point in self._points.of(rows, reduced):
-            board.put(f"point {step}", "point", point)
-        for event in event_contents(rows):
-            board.put(f"event {event['number']}", "happened", event)
-        progress = Progress.of_rows(rows)
-        self._elapsed_s = progress.elapsed_s
-        self._count = StepCount(self._plan, progress.done)
-        if rows.readings != self._rows.readings or rows.checks != self._rows.checks:
-            self._models.offer(reduced)
-        self._rows = rows
-
-    def _state(self) -> ScanState:
-        return scan_state(
-            self._scan,
-            self._rows.events,
-            self._reader.folder,
-            complete=self._count.accepted == self._count.total,
-        )
-
-    def _put_state(self, state: ScanState) -> None:
-        count = self._count
-        content = {
-            "done": count.accepted,
-            "total": count.total,
-            "elapsed_s": rounded(self._elapsed_s),
-            "left_s": rounded(count.left_s),
-            "state": state.state,
-            "text": escape_control_characters(state.text),
-            "actions": list(state.actions),
-        }
-        self._board.put("progress", "progress", content)

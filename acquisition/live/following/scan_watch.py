@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from acquisition.live.following.curves import SIGNS
 
 _AXES = {"theta_i": "lamp", "dphi": "azimuth", "theta_r": "camera"}
 _NEVER_S = -math.inf
+_OLD_S = 2 * WATCH_EVERY_S  # of a state: a scan that is watched writes it four times a second
 _RIG, _PICTURE = "rig", "picture"
 _UNKNOWN = {"axes": [], "lamp": "unknown"}
 
@@ -44,16 +46,12 @@ class ScanWatch:
             self._ask()
         else:
             self.answers, self.silent, self._asked_s = False, False, _NEVER_S
-        self.state = read_state(self.channel) if self.answers else None
+        self.state = _fresh(read_state(self.channel)) if self.answers else None
         if self.state is None:
             self._board.put(_RIG, _RIG, _UNKNOWN)
         else:
             self._board.put(_RIG, _RIG, {"axes": _axes(self.state), "lamp": self.state["lamp"]})
-        picture = None if self.state is None else self.state["picture"]
-        if picture is None:
-            self._board.remove(_PICTURE)  # a later browser could not load it any more
-        else:
-            self._board.put(_PICTURE, _PICTURE, picture)
+        self._board.put(_PICTURE, _PICTURE, self.state and self.state["picture"])
 
     def _ask(self) -> None:
         """Find out whether the scan answers: it publishes for some seconds after each time."""
@@ -68,6 +66,14 @@ class ScanWatch:
             self.answers, self.silent = False, True
         else:
             self.answers, self.silent = True, False
+
+
+def _fresh(state: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
+    """Return a state, None for an old one: nobody was watching, and a new one follows at once."""
+    if state is None:
+        return None
+    age = datetime.now(UTC) - datetime.fromisoformat(state["time_utc"])
+    return state if abs(age.total_seconds()) < _OLD_S else None
 
 
 def _axes(state: Mapping[str, Any]) -> list[dict[str, Any]]:

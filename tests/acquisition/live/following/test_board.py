@@ -66,16 +66,6 @@ def test_the_same_content_again_is_no_change() -> None:
     assert (board.number, told) == (1, [1])
 
 
-def test_what_was_removed_is_not_sent_any_more() -> None:
-    board = Board()
-    board.put("a", "kind", {"x": 1})
-    board.put("b", "kind", {"x": 2})
-    board.remove("a")
-    assert [data for _, data in seen(board, 0)] == [{"x": 2}]
-    board.put("a", "kind", {"x": 1})
-    assert [data for _, data in seen(board, 0)] == [{"x": 2}, {"x": 1}]
-
-
 def test_a_position_is_one_of_this_board_or_none() -> None:
     board = Board()
     board.put("a", "kind", {"x": 1})

@@ -1,0 +1,62 @@
+"""Follower of a camera that is being aimed: the newest picture, how sharp and how bright it is."""
+
+from __future__ import annotations
+
+from acquisition.live.following.board import Board, Content
+from acquisition.live.following.follower import Follower
+from acquisition.live.following.scan_watch import ScanWatch
+
+_RUN = {
+    "title": "Aiming the camera",
+    "sample": "",
+    "folder": "",
+    "rig": "",
+    "quantity": "BRDF",
+    "unit": "1/sr",
+    "steps": 0,
+    "points": 0,
+    "started_utc": "",
+    "sweep": "theta_r",
+    "range_deg": [0.0, 0.0],
+    "aiming": True,
+}
+_COUNTS = (
+    *("saturated_pixels", "window_saturated_pixels", "window_mean_dn", "peak_dn"),
+    *("full_scale_dn", "exposure_s"),
+)
+_ENDED = "The camera is not being aimed any more"
+
+
+class AimFollower(Follower):
+    """Follower of the process that has this channel, and takes pictures for somebody to see."""
+
+    def __init__(self, scan: ScanWatch, board: Board) -> None:
+        super().__init__(scan, board)
+        self._best_sharpness = 0.0
+        self._begun = False
+        board.put("run", "run", _RUN)
+
+    def poll(self) -> None:
+        """Look once, and put on the board what is new."""
+        self.scan.poll()
+        picture = None if self.scan.state is None else self.scan.state["picture"]
+        if picture is not None and picture["sharpness"] is not None:
+            self._best_sharpness = max(self._best_sharpness, picture["sharpness"])
+            aim = {name: picture[name] for name in ("sharpness", *_COUNTS)}
+            self._board.put("aim", "aim", {**aim, "best_sharpness": self._best_sharpness})
+        self._put_progress()
+
+    def _put_progress(self) -> None:
+        self._begun = self._begun or self.scan.answers
+        ended = self._begun and not self.scan.answers
+        text = "" if self.scan.state is None else self.scan.state["text"]
+        content: Content = {
+            "done": 0,
+            "total": 0,
+            "elapsed_s": None,
+            "left_s": None,
+            "state": "finished" if ended else "aiming",
+            "text": _ENDED if ended else text,
+            "actions": [],
+        }
+        self._board.put("progress", "progress", content)
