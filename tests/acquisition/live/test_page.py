@@ -8,6 +8,9 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+from acquisition.interlocks import doubt, frame_scatter, lamp_checks, no_light
+from acquisition.measure import radiometry, stray_light
+from acquisition.results import reduction
 from tests.support.paths import ROOT
 
 LIVE = ROOT / "acquisition" / "live"
@@ -88,3 +91,14 @@ def test_vendored_files_are_those_whose_digest_is_noted() -> None:
         assert noted
         assert {name: found[name] for name in noted} == noted
         assert set(found) == {*noted, "README.md", "LICENSE"}
+
+
+def test_every_flag_of_a_reading_has_words() -> None:
+    flags = {
+        "saturated", "hot pixels", "dead pixels", radiometry.LEAVES_FRAME, radiometry.FEW_PIXELS,
+        stray_light.LEAVES, stray_light.BRIGHT, frame_scatter.FLAG, doubt.DOUBTED,
+        no_light.NO_SIGNAL, lamp_checks.UNPROVEN, lamp_checks.STOPPED, reduction.NO_TILE_YET,
+    }  # fmt: skip
+    text = (PAGE / "scripts" / "words.js").read_text()
+    table = text.partition("const FLAGS = {")[2].partition("\n};")[0]
+    assert set(re.findall(r"^  '?([\w ]+?)'?: \(", table, re.M)) == flags

@@ -26,7 +26,6 @@ const FLAGS = {
   'hot pixels': () => 'hot pixels cover too much of the window.',
   'dead pixels': () => 'dead pixels cover too much of the window.',
   'no signal': () => 'no light was measured. Look at the lamp and its shutter.',
-  'no brdf': () => 'no BRDF can be given.',
   'no white tile yet': () => 'the white tile that its BRDF needs has not been measured yet.',
   'dark patch leaves frame': () =>
     'the dark patch, which measures stray light, leaves the picture.',
@@ -48,6 +47,7 @@ function saturated(point) {
 }
 
 export function flagInWords(flag, point) {
+  if (flag.startsWith('white tile ')) return `${flag}: its BRDF needs that reading of the tile.`;
   const words = FLAGS[flag]?.(point);
   return words ? `${flag}: ${words}` : `${flag}.`;
 }
