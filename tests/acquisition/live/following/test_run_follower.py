@@ -17,7 +17,7 @@ from acquisition.live.following.run_reader import RunReader
 from acquisition.plan.plan import make_plan
 from acquisition.results.reduction import reduced_run
 from instrument.config.load import Loaded
-from instrument.record.event_kinds import FINISHED, RESUMED, STOPPED
+from instrument.record.event_kinds import DAMAGED, FINISHED, RESUMED, STOPPED
 from instrument.record.record import FILE_NAME, Record
 from tests.support.live.runs import begun_run, live_protocol, whole_run
 from tests.support.live.scan_side import scan_side
@@ -131,6 +131,7 @@ def test_damaged_readings_that_a_resume_measures_again_come_back(
             record.add_event(NOW, RESUMED, "the rig may move: --yes")
             follower.poll()
             record.remove_damaged()
+            record.add_event(NOW, DAMAGED, "reading 5")
             scan(loaded, record)
         follower.poll()
         assert len(contents(board, "point")) == 16
