@@ -223,7 +223,9 @@ def report(folder: RunFolder, json: Json = False) -> None:
 @app.command()
 def watch(
     folder: RunFolder,
-    port: Annotated[int, typer.Option(help="Port of this computer. Default: a free one.")] = 0,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of this computer; 0: a free one.")
+    ] = 0,
 ) -> None:
     """Show a run in the browser, as it grows or afterwards, until Ctrl-C.
 

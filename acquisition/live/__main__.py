@@ -7,23 +7,21 @@ program that scans has ended, in whichever way.
 from __future__ import annotations
 
 import argparse
-import os
 import signal
 import socket
 import sys
 from pathlib import Path
 
-# Before NumPy: a scan has the machine, and several threads in linear algebra would only cost time.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-from acquisition.live.live_page import LivePage
-from acquisition.live.page_process import NICENESS
+from acquisition.live.page_process import be_modest
 from instrument.errors import GonioError
 
 
 def main() -> None:
     """Serve the page until the standard input ends."""
-    be_quiet()
+    _leave_the_keys()
+    be_modest()
+    from acquisition.live.live_page import LivePage
+
     found = _arguments()
     watched = found.run or found.aim
     listener = socket.socket(fileno=found.socket)
@@ -36,12 +34,11 @@ def main() -> None:
         sys.exit(str(error))
 
 
-def be_quiet() -> None:
-    """Leave the processor to the scan, and the keys of the terminal as well."""
-    os.nice(NICENESS)
+def _leave_the_keys() -> None:
+    """Ignore the keys of the terminal, which are for the scan, and unblock what it had blocked."""
     for number in (signal.SIGINT, signal.SIGQUIT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_SETMASK, ())  # a scan blocks signals while it ends
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
 
 
 def _arguments() -> argparse.Namespace:

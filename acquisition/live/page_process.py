@@ -6,6 +6,7 @@ token are made here. The page's standard input says that the scan is alive: it e
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -19,11 +20,18 @@ from acquisition.live.address import address, listening_socket, new_token
 from acquisition.terminal.console import console
 from instrument.errors import InputError
 
-NICENESS = 10
-"""Of a page: a scan that goes on has the machine."""
+_NICENESS = 10
+_MOST_PIXELS = 2**27  # of a picture: twice those of the largest camera that a record can hold
 _LIBRARIES = ("starlette", "uvicorn")
 _END_S = 8.0  # for the last messages and the last fit
 _ROOT = Path(__file__).parents[2]  # from which the page process imports the same program
+
+
+def be_modest() -> None:
+    """Leave the machine to a scan that goes on, and refuse pictures of any size; before NumPy."""
+    os.nice(_NICENESS)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(_MOST_PIXELS))
 
 
 def require_libraries() -> None:

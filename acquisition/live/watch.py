@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import threading
 from pathlib import Path
 
 from acquisition.live.address import address, listening_socket, new_token
-from acquisition.live.page_process import NICENESS, require_libraries
+from acquisition.live.page_process import be_modest, require_libraries
 from acquisition.terminal.console import out
 from acquisition.terminal.orderly_end import orderly_end
 
@@ -18,9 +17,9 @@ def watch_run(folder: Path, port: int) -> None:
     Raises `InputError` or `StorageError` where the folder is no run, or one that cannot be read.
     """
     require_libraries()
+    be_modest()
     from acquisition.live.live_page import LivePage
 
-    os.nice(NICENESS)
     token, listener = new_token(), listening_socket(port)
     try:
         with orderly_end(), LivePage(folder, listener, token):

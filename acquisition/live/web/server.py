@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 import threading
 
@@ -12,6 +13,17 @@ from instrument.closeable import Closeable
 
 _MOST_CONNECTIONS = 64
 _LAST_ANSWERS_S = 1  # for browsers that do not read, at the end
+
+
+class _Server(uvicorn.Server):
+    """Server that ends the connections of browsers that do not read, as well."""
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().shutdown(sockets)
+        for connection in tuple(self.server_state.connections):
+            transport: asyncio.Transport = connection.transport
+            transport.abort()
+        await asyncio.sleep(0)
 
 
 class WebServer(Closeable):
@@ -31,7 +43,7 @@ class WebServer(Closeable):
             limit_concurrency=_MOST_CONNECTIONS,
             timeout_graceful_shutdown=_LAST_ANSWERS_S,
         )
-        self._server = uvicorn.Server(config)
+        self._server = _Server(config)
         self._thread = threading.Thread(
             target=self._server.run, args=([listener],), name="web", daemon=True
         )

@@ -32,6 +32,7 @@ def live_protocol(folder: Path, *, tile: bool = True, keep_frames: bool = False)
         text = re.sub(r"  white_tile: .*\n", "", text)
     if keep_frames:
         text += "keep_frames: true\n"
+    text = text.replace("+torrance_sparrow", "").replace(", ks: 0.076", "")
     text += "fit: {models: [lambert, oren_nayar]}\n"
     (folder / "small.yaml").write_text(text)
     return load_protocol(folder / "small.yaml")

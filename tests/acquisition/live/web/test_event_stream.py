@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
+
+from acquisition.live.address import address, listening_socket, port_of
+from acquisition.live.following.board import Board
+from acquisition.live.web.app import Shown, live_app
+from acquisition.live.web.server import WebServer
 from tests.support.live.page_client import Browser
+from tests.support.live.pages import TOKEN
+from tests.support.timing.deadline import wait_for
 
 MODEL = "model"
 
@@ -38,3 +48,44 @@ def test_the_id_of_an_earlier_page_gives_everything_after_a_reset(page: str) -> 
         other.read_until(has_model)
     assert one.kinds[0] == "reset"
     assert other.shown == {key: value for key, value in one.shown.items() if key[0] != "reset"}
+
+
+def test_a_browser_that_does_not_read_holds_up_neither_the_others_nor_the_end(
+    tmp_path: Path,
+) -> None:
+    board = Board()
+    with ExitStack() as stack, served_board(board, tmp_path) as page:
+        stalled = [stack.enter_context(Browser(page)) for _ in range(3)]
+        reading = stack.enter_context(Browser(page))
+        wait_for(lambda: board.readers == 4, "all browsers")
+        large = "x" * 100_000
+        for number in range(100):
+            board.put(f"event {number}", "happened", {"number": number, "text": large})
+        reading.read_until(lambda one: len(one.shown) == 100)
+        for number in range(100):  # newer content takes the place of what was not read
+            board.put(f"event {number}", "happened", {"number": number, "text": "short"})
+        for browser in (reading, *stalled):
+            browser.read_until(lambda one: one.ids[-1:] == [f"{board.boot}-200"])
+            assert [data["text"] for data in browser.shown.values()] == ["short"] * 100
+        assert all(len(one.ids) < 200 for one in stalled)
+        for number in range(100):
+            board.put(f"event {number}", "happened", {"number": number, "text": large})
+        assert board.readers == 4
+    assert board.readers == 0
+
+
+def test_a_browser_that_went_away_is_noticed(tmp_path: Path) -> None:
+    board = Board()
+    with served_board(board, tmp_path) as page:
+        with Browser(page):
+            wait_for(lambda: board.readers == 1, "the browser")
+        wait_for(lambda: board.readers == 0, "its end")
+
+
+@contextmanager
+def served_board(board: Board, channel: Path) -> Iterator[str]:
+    """Server of a board alone; the page's address."""
+    with listening_socket(0) as listener:
+        app = live_app(Shown(board, channel, None), TOKEN, port_of(listener))
+        with WebServer(app, listener), closing(board):
+            yield address(listener, TOKEN)
