@@ -7,13 +7,16 @@ every point again.
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterator
 from typing import Any
+
+import numpy as np
 
 from acquisition.live.following.curves import Curves
 from acquisition.plan.plan import Plan
-from acquisition.results.reduction import Reduced, root_sum_square
+from acquisition.results.reduction import NO_TILE_YET, Reduced, root_sum_square
 from instrument.config.load import Loaded
+from instrument.geometry import FloatArray
 from instrument.record.reading import Reading, Rows
 from instrument.text.terminal_safe import escape_control_characters
 
@@ -60,21 +63,31 @@ class PointMessages:
         """Yield step and content of every reading, in the order of the plan."""
         values, u = self._values(reduced)
         own = {
-            point.step: (*_rounded(float(v), float(u_v)), flags)
+            point.step: (*_rounded(float(v), float(u_v)), flags.split("; "))
             for point, v, u_v, flags in zip(reduced.points, values, u, reduced.flags, strict=True)
         }
         for reading in rows.readings:
-            value, u_value, flags = own.get(reading.step, (None, None, reading.flags))
-            content = self._counts(reading)
-            content |= {"value": value, "u": u_value, "flags": [f for f in flags.split("; ") if f]}
-            yield reading.step, content
+            alone = (None, None, reading.flags.split("; "))
+            value, u_value, flags = own.get(reading.step, alone)
+            yield (
+                reading.step,
+                self._counts(reading)
+                | {
+                    "value": value,
+                    "u": u_value,
+                    "flags": [flag for flag in flags if flag and flag != NO_TILE_YET],
+                    "provisional": NO_TILE_YET in flags,
+                },
+            )
 
-    def _values(self, reduced: Reduced) -> tuple[Sequence[float], Sequence[float]]:
-        """Return the value of every point and its u, without the part that needs a model."""
+    def _values(self, reduced: Reduced) -> tuple[FloatArray, FloatArray]:
+        """Values (N,) in the run's unit and their u, without the part that needs a model."""
         if not self._absolute:
-            return reduced.radiance.tolist(), reduced.u_radiance.tolist()
-        u = abs(reduced.brdf) * root_sum_square(list(reduced.parts.values()))
-        return reduced.brdf.tolist(), u.tolist()
+            return reduced.radiance, reduced.u_radiance
+        u = np.abs(reduced.brdf) * root_sum_square(list(reduced.parts.values()))
+        brdf, u_brdf = _provisional_brdf(reduced)
+        unknown = np.isnan(reduced.brdf)
+        return np.where(unknown, brdf, reduced.brdf), np.where(unknown, u_brdf, u)
 
     def _counts(self, reading: Reading) -> Content:
         return {
@@ -95,6 +108,18 @@ class PointMessages:
             "time_utc": reading.time_utc,
             "has_frame": reading.step in self._with_frame,
         }
+
+
+def _provisional_brdf(reduced: Reduced) -> tuple[FloatArray, FloatArray]:
+    """BRDF (N,) in 1/sr and its u as if the lamp were as bright as at the tiles that were read.
+
+    Where the lamp is set by hand, the tile of a setting may follow after all of its points.
+    """
+    lit = reduced.radiance / np.cos(np.radians([p.theta_i_deg for p in reduced.points]))
+    per_brdf = (lit / reduced.brdf)[reduced.valid & np.isfinite(reduced.brdf)]
+    level = float(np.median(per_brdf)) if per_brdf.size else math.nan
+    u_relative = reduced.u_radiance / np.abs(reduced.radiance)
+    return lit / level, np.abs(lit / level) * u_relative
 
 
 def event_contents(rows: Rows) -> Iterator[Content]:

@@ -18,12 +18,14 @@ from tests.support.whole_scans.stopped_scan import scan
 _SHRINK = 5
 
 
-def live_protocol(folder: Path, *, tile: bool = True, keep_frames: bool = False) -> Loaded:
-    """Two incidences of five views on the bench, with 1/5 of its camera's rows and columns."""
-    rig = (CONFIGS / "rigs" / "bench_12bit.yaml").read_text()
+def live_protocol(
+    folder: Path, *, rig: str = "bench_12bit", tile: bool = True, keep_frames: bool = False
+) -> Loaded:
+    """Two incidences of five views on a rig, with 1/5 of its camera's rows and columns."""
+    rig_text = (CONFIGS / "rigs" / f"{rig}.yaml").read_text()
     for name in ("width_px", "height_px", "axis_row_px", "axis_column_px"):
-        rig = re.sub(rf"({name}: )([\d.]+)", _shrunk, rig)
-    (folder / "small_rig.yaml").write_text(rig)
+        rig_text = re.sub(rf"({name}: )([\d.]+)", _shrunk, rig_text)
+    (folder / "small_rig.yaml").write_text(rig_text)
     text = (CONFIGS / "protocols" / "demo.yaml").read_text()
     text = text.replace("[30.0, 45.0, 60.0]", "[30.0, 60.0]").replace("num: 33", "num: 5")
     text = text.replace("../rigs/bench_12bit.yaml", "small_rig.yaml")

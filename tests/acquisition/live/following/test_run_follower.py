@@ -216,3 +216,26 @@ def test_a_dead_scan_that_left_its_channel_has_no_actions(loaded: Loaded, tmp_pa
     with followed(run) as (_, board):
         (progress,) = contents(board, "progress")
     assert (progress["state"], progress["actions"]) == ("lost", [])
+
+
+def test_points_whose_white_tile_comes_after_them_are_shown_before_it(tmp_path: Path) -> None:
+    """A lamp that is set by hand: every second setting begins with the sample."""
+    loaded = live_protocol(tmp_path, rig="paper_1995")
+    steps = make_plan(loaded).steps
+    late = max(step.index for step in steps if step.kind == "tile")
+    waiting = [s.index for s in steps if s.kind == "point" and s.block == steps[late].block]
+    assert max(waiting) < late
+    run = tmp_path / "run"
+    with begun_run(loaded, run) as record, followed(run) as (follower, board):
+        scan(loaded, record, upto=max(waiting))
+        follower.poll()
+        before = {p["step"]: p for p in contents(board, "point")}
+        scan(loaded, record)
+        follower.poll()
+        after = {p["step"]: p for p in contents(board, "point")}
+    assert [s for s, p in before.items() if p["provisional"]] == waiting
+    assert not any(p["provisional"] for p in after.values())
+    for step in waiting:
+        assert before[step]["flags"] == after[step]["flags"]
+        assert before[step]["value"] == pytest.approx(after[step]["value"], rel=0.03)
+        assert 0 < before[step]["u"] < 0.05 * before[step]["value"]

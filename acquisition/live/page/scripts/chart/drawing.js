@@ -5,6 +5,7 @@ import { colour } from '../theme.js';
 import { isFlagged } from './curves.js';
 import { drawFlag, drawSymbol, FLAG_RADIUS, styleOf } from './symbols.js';
 
+const PALE = 0.5; // opacity of a value that will change: its white tile is not read yet
 const FLAG_REACH = FLAG_RADIUS + 2.5; // with its ring
 
 // Radius of symbols in CSS pixels: smaller where many points stand side by side.
@@ -49,9 +50,11 @@ function drawCurve(frame, curve, radius) {
   if (curve.line) drawLine(frame, curve.line, style.dash);
   context.setLineDash([]);
   for (const point of curve.points.filter((p) => p.value !== null && !isFlagged(p))) {
+    context.globalAlpha = point.provisional ? PALE : 1;
     drawBar(frame, point);
     drawSymbol(context, style.symbol, ...frame.placed(point), radius);
   }
+  context.globalAlpha = 1;
 }
 
 function drawLine({ context, scale, toX, toY }, line, dash) {

@@ -32,7 +32,7 @@ function facts(run, point) {
   const mean = `${number(point.signal_dn)} DN (${percent(point.signal_dn / point.full_scale_dn)} of full scale)`;
   const peak = `${number(point.peak_dn)} of ${point.full_scale_dn} DN (${percent(point.peak_dn / point.full_scale_dn)})`;
   return [
-    [run?.quantity ?? 'Value', withU(point.value, point.u, run?.unit ?? '')],
+    [valueName(run, point), withU(point.value, point.u, run?.unit ?? '')],
     ['Mean, dark subtracted', mean],
     ['Brightest pixel', peak],
     ['Saturated pixels', String(point.saturated_pixels)],
@@ -42,6 +42,12 @@ function facts(run, point) {
     ['Time', timeOfDay(point.time_utc)],
     ['Step of the plan', String(point.step)],
   ];
+}
+
+// Before the white tile of its lamp setting was read, a BRDF is that of the lamp's earlier level.
+function valueName(run, point) {
+  const name = run?.quantity ?? 'Value';
+  return point.provisional ? `${name}, until its white tile is read` : name;
 }
 
 function showFrame(point) {
