@@ -46,7 +46,7 @@ class RunFollower(Follower):
         self._models = ModelThread(board, loaded, self._curves)
         self._rows, self._elapsed_s = _EMPTY, 0.0
         self._count = StepCount(self._plan, ())
-        self._trouble = ""
+        self._trouble, self._over = "", False
 
     def poll(self) -> None:
         """Look once, and put on the board what is new."""
@@ -62,6 +62,7 @@ class RunFollower(Follower):
 
     def finish(self) -> None:
         """Look for the last time, and fit once more: what was measured is complete."""
+        self._over = True
         super().finish()
         self._models.finish(_LAST_FIT_S)
 
@@ -93,6 +94,7 @@ class RunFollower(Follower):
             self._rows.events,
             self._reader.folder,
             complete=self._count.accepted == self._count.total,
+            over=self._over,
         )
 
     def _put_state(self, state: ScanState) -> None:

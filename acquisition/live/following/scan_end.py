@@ -51,10 +51,12 @@ def scan_state(
     folder: Path | None,
     *,
     complete: bool,
+    over: bool = False,
 ) -> ScanState:
     """Return the state of a scan.
 
-    folder: of the run, None if it was removed. complete: all steps are measured.
+    folder: of the run, None if it was removed. complete: all steps are measured. over: the program
+    that scans has said that it is ending; it may hold the run for a while yet.
     """
     kind, text = _last_state(events)
     if kind == FINISHED and complete:
@@ -65,7 +67,7 @@ def scan_state(
         return ScanState(shown, scan.state["text"], _ACTIONS.get(phase, ()))
     if folder is None:
         return ScanState("lost", _REMOVED)
-    if scan.answers or any(locking(folder)):
+    if not over and (scan.answers or any(locking(folder))):
         return ScanState("lost", _SILENT) if scan.silent else ScanState("measuring", "")
     how = _ENDS.get(kind, "lost")
     return ScanState(how, f"{text or _KILLED}. Go on with: gonio resume {folder}")

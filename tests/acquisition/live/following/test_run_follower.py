@@ -107,6 +107,20 @@ def test_a_run_that_is_stopped_resumed_and_finished_says_so(loaded: Loaded, tmp_
         assert len(contents(board, "point")) == 16
 
 
+def test_a_stop_is_told_at_the_end_while_the_scan_still_holds_its_run(
+    loaded: Loaded, tmp_path: Path
+) -> None:
+    """The page ends before the program that scans does."""
+    with begun_run(loaded, tmp_path / "run") as record:
+        scan(loaded, record, upto=4)
+        with followed(tmp_path / "run") as (follower, board):
+            record.add_event(NOW, STOPPED, "stopped by the operator")
+            follower.poll()
+            assert state(board) == "measuring"
+            follower.finish()
+            assert state(board) == "stopped"
+
+
 def test_a_scan_that_was_killed_is_lost_and_can_be_resumed(loaded: Loaded, tmp_path: Path) -> None:
     run = tmp_path / "run"
     with begun_run(loaded, run) as record:

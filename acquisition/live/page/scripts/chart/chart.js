@@ -107,7 +107,9 @@ function axis(label, size, unit) {
 
 // All numbers of an axis with the decimals that its step needs.
 function tick(value, step) {
-  const decimals = Math.max(0, Math.ceil(-Math.log10(step) - 1e-6));
-  if (decimals > 4 || step > 1e4) return number(value);
+  const decimals = [0, 1, 2, 3, 4].find((n) => isWhole(step * 10 ** n));
+  if (decimals === undefined || step > 1e4) return number(value);
   return value.toFixed(decimals).replace('-', '\u2212');
 }
+
+const isWhole = (x) => Math.abs(x - Math.round(x)) < 1e-6 * x;

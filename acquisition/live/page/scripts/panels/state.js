@@ -10,8 +10,9 @@ export function showState(scan) {
   const [name, looks] = STATES[progress.state] ?? [progress.state, 'wait'];
   write('state-name', name);
   by('state-name').className = `pill ${looks}`;
-  write('state-text', progress.text ?? '');
-  announce(progress.state, `${name}. ${progress.text ?? ''}`);
+  const text = progress.text === progress.state ? '' : progress.text;
+  write('state-text', text);
+  announce(progress.state, `${name}. ${text}`);
   showTitle(scan, name);
   showProgress(progress);
 }
