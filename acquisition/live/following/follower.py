@@ -11,7 +11,7 @@ from acquisition.live.following.scan_watch import ScanWatch
 from instrument.closeable import Closeable
 
 _EVERY_S, _UNWATCHED_S = 0.2, 1.0  # between two looks, with and without a browser
-_IDLE = 4.0  # time without work for each time of work: a long run takes longer to reduce
+_IDLE = 9.0  # time without work for each time of work: a long run takes longer to reduce
 
 
 class Follower(Closeable):

@@ -21,6 +21,7 @@ from instrument.record.reading import Reading
 _MOST_VALUES = 20_000  # of all lines together
 _DENSE, _SPARSE = 241, 31  # places along one line
 _DIGITS = 5
+_ADVICE = ": resume the scan"  # of a run that is not being measured
 _NO_LEVEL = "no line where the lamp is moved along a curve: its level is free without a tile"
 
 
@@ -29,7 +30,8 @@ def model_content(reduced: Reduced, loaded: Loaded, curves: Curves) -> dict[str,
     fitted = fit_run(reduced, loaded)
     chosen = fitted.chosen
     if fitted.choice is None or chosen is None:
-        return {"name": None, "text": fitted.reason, "verdict": None, "points": 0, "lines": []}
+        text = fitted.reason.removesuffix(_ADVICE)
+        return {"name": None, "text": text, "verdict": None, "points": 0, "lines": []}
     lines, levelled = _lines(reduced, fitted, chosen, curves)
     verdict, parameters = fitted.choice.verdict, parameters_of(chosen)
     text = f"{chosen.model}, {verdict}: "

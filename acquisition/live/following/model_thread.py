@@ -26,10 +26,13 @@ class ModelThread(Closeable):
         self._busy = self._hurry = self._closed = False
         threading.Thread(target=self._work, name="model", daemon=True).start()
 
-    def offer(self, reduced: Reduced) -> None:
-        """Have these points fitted in their turn; they replace earlier ones that still wait."""
+    def offer(self, reduced: Reduced, *, last: bool = False) -> None:
+        """Have these points fitted in their turn; they replace earlier ones that still wait.
+
+        `last`: no more will come, so they are fitted at once.
+        """
         with self._wanted:
-            self._newest = reduced
+            self._newest, self._hurry = reduced, last
             self._wanted.notify_all()
 
     def finish(self, limit_s: float) -> None:

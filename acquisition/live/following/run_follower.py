@@ -85,15 +85,19 @@ class RunFollower(Follower):
         self._elapsed_s = progress.elapsed_s
         self._count = StepCount(self._plan, progress.done)
         if rows.readings != self._rows.readings or rows.checks != self._rows.checks:
-            self._models.offer(reduced)
+            self._models.offer(reduced, last=self._complete)
         self._rows = rows
+
+    @property
+    def _complete(self) -> bool:
+        return self._count.accepted == self._count.total
 
     def _state(self) -> ScanState:
         return scan_state(
             self.scan,
             self._rows.events,
             self._reader.folder,
-            complete=self._count.accepted == self._count.total,
+            complete=self._complete,
             over=self._over,
         )
 

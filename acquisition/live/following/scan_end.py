@@ -17,6 +17,7 @@ _ACTIONS = {
 }
 _ENDS = {FINISHED: "finished", STOPPED: "stopped", FAULT: "failed"}
 _KILLED = "The scan ended without a word: its program was killed, or the computer was switched off"
+_DAMAGED = "The scan was finished, and readings were damaged on the disk since"
 _SILENT = "The scan does not answer: its program hangs, or was halted"
 _REMOVED = "The run's folder was removed: shown is what had been measured until then"
 
@@ -69,8 +70,8 @@ def scan_state(
         return ScanState("lost", _REMOVED)
     if not over and (scan.answers or any(locking(folder))):
         return ScanState("lost", _SILENT) if scan.silent else ScanState("measuring", "")
-    how = _ENDS.get(kind, "lost")
-    return ScanState(how, f"{text or _KILLED}. Go on with: gonio resume {folder}")
+    why = _DAMAGED if kind == FINISHED else text or _KILLED
+    return ScanState(_ENDS.get(kind, "lost"), f"{why}. Go on with: gonio resume {folder}")
 
 
 def _last_state(events: Iterable[tuple[str, str, str]]) -> tuple[str, str]:

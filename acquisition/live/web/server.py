@@ -12,18 +12,23 @@ from starlette.types import ASGIApp
 from instrument.closeable import Closeable
 
 _MOST_CONNECTIONS = 64
-_LAST_ANSWERS_S = 1  # for browsers that do not read, at the end
+_LAST_ANSWERS_S = 1.0  # for browsers that do not read, at the end
+_MOST_S = 5  # after which uvicorn gives up, with a message
 
 
 class _Server(uvicorn.Server):
     """Server that ends the connections of browsers that do not read, as well."""
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        impatient = asyncio.create_task(self._abort_later())
         await super().shutdown(sockets)
+        impatient.cancel()
+
+    async def _abort_later(self) -> None:
+        await asyncio.sleep(_LAST_ANSWERS_S)
         for connection in tuple(self.server_state.connections):
             transport: asyncio.Transport = connection.transport
             transport.abort()
-        await asyncio.sleep(0)
 
 
 class WebServer(Closeable):
@@ -41,7 +46,7 @@ class WebServer(Closeable):
             proxy_headers=False,
             server_header=False,
             limit_concurrency=_MOST_CONNECTIONS,
-            timeout_graceful_shutdown=_LAST_ANSWERS_S,
+            timeout_graceful_shutdown=_MOST_S,
         )
         self._server = _Server(config)
         self._thread = threading.Thread(

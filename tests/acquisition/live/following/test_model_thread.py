@@ -74,6 +74,17 @@ def test_only_the_newest_points_are_fitted_and_an_offer_never_waits() -> None:
         assert board.after(0, 1)[-1].data == {"name": 999}
 
 
+def test_the_last_points_are_fitted_without_a_pause() -> None:
+    with fitted() as (thread, fits, _):
+        begun_s = time.monotonic()
+        thread.offer("first")
+        wait_for(lambda: fits.given == ["first"], "the first fit")
+        thread.offer("all", last=True)
+        wait_for(lambda: fits.given == ["first", "all"], "the last fit")
+        # The pause after the first fit would have been four times its processor time.
+        assert fits.used_s > 0.21 * (time.monotonic() - begun_s)
+
+
 def test_an_end_does_not_wait_for_ever() -> None:
     with fitted() as (thread, fits, _):
         fits.held.clear()

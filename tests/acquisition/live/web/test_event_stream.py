@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
+import pytest
+
 from acquisition.live.address import address, listening_socket, port_of
 from acquisition.live.following.board import Board
 from acquisition.live.web.app import Shown, live_app
@@ -51,7 +53,7 @@ def test_the_id_of_an_earlier_page_gives_everything_after_a_reset(page: str) -> 
 
 
 def test_a_browser_that_does_not_read_holds_up_neither_the_others_nor_the_end(
-    tmp_path: Path,
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     board = Board()
     with ExitStack() as stack, served_board(board, tmp_path) as page:
@@ -72,6 +74,7 @@ def test_a_browser_that_does_not_read_holds_up_neither_the_others_nor_the_end(
             board.put(f"event {number}", "happened", {"number": number, "text": large})
         assert board.readers == 4
     assert board.readers == 0
+    assert [record.message for record in caplog.records if record.levelname != "INFO"] == []
 
 
 def test_a_browser_that_went_away_is_noticed(tmp_path: Path) -> None:
