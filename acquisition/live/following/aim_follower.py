@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from acquisition.live.following.board import Board, Content
+from acquisition.live.following.board import Board
 from acquisition.live.following.follower import Follower
 from acquisition.live.following.scan_watch import ScanWatch
 
@@ -50,13 +50,5 @@ class AimFollower(Follower):
         self._begun = self._begun or self.scan.answers
         ended = self._begun and not self.scan.answers
         text = "" if self.scan.state is None else self.scan.state["text"]
-        content: Content = {
-            "done": 0,
-            "total": 0,
-            "elapsed_s": None,
-            "left_s": None,
-            "state": "finished" if ended else "aiming",
-            "text": _ENDED if ended else text,
-            "actions": [],
-        }
-        self._board.put("progress", "progress", content)
+        shown = ("finished", _ENDED) if ended else ("aiming", text)
+        self.put_progress(state=shown[0], text=shown[1])

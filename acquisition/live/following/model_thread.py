@@ -70,6 +70,6 @@ class ModelThread(Closeable):
     def _content(self, reduced: Reduced) -> dict[str, object]:
         try:
             return model_content(reduced, self._loaded, self._curves)
-        except (ArithmeticError, ValueError) as error:  # of few or flagged points; more will come
+        except Exception as error:  # noqa: BLE001 - it is shown, and more points will come
             text = f"the fit failed: {error}"
             return {"name": None, "text": text, "verdict": None, "points": 0, "lines": []}

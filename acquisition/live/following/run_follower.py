@@ -12,7 +12,6 @@ from acquisition.live.following.follower import Follower
 from acquisition.live.following.messages import (
     PointMessages,
     event_contents,
-    rounded,
     run_content,
 )
 from acquisition.live.following.model_thread import ModelThread
@@ -24,7 +23,6 @@ from acquisition.plan.step_count import StepCount
 from acquisition.results.reduction import reduced_rows
 from instrument.errors import GonioError
 from instrument.record.reading import Rows
-from instrument.text.terminal_safe import escape_control_characters
 
 _LAST_FIT_S = 2.0
 _EMPTY = Rows((), (), ())
@@ -102,14 +100,4 @@ class RunFollower(Follower):
         )
 
     def _put_state(self, state: ScanState) -> None:
-        count = self._count
-        content = {
-            "done": count.accepted,
-            "total": count.total,
-            "elapsed_s": rounded(self._elapsed_s),
-            "left_s": rounded(count.left_s),
-            "state": state.state,
-            "text": escape_control_characters(state.text),
-            "actions": list(state.actions),
-        }
-        self._board.put("progress", "progress", content)
+        self.put_progress(**state._asdict(), count=self._count, elapsed_s=self._elapsed_s)

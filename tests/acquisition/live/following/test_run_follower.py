@@ -253,3 +253,17 @@ def test_points_whose_white_tile_comes_after_them_are_shown_before_it(tmp_path: 
         assert before[step]["flags"] == after[step]["flags"]
         assert before[step]["value"] == pytest.approx(after[step]["value"], rel=0.03)
         assert 0 < before[step]["u"] < 0.05 * before[step]["value"]
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_follower_that_fails_says_so(
+    loaded: Loaded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = tmp_path / "run"
+    with begun_run(loaded, run), followed(run) as (follower, board):
+        monkeypatch.setattr(follower, "_state", lambda: 1 // 0)
+        follower.start()
+        wait_for(lambda: state(board) == "lost", "the end of the follower")
+        (progress,) = contents(board, "progress")
+    assert "gonio watch" in progress["text"]
+    assert "ZeroDivisionError" in progress["text"]
