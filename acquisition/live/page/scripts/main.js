@@ -66,5 +66,6 @@ listen(curves, selection, () => actions.pauseOrResume());
 useTheme(showAll);
 follow((kind, data) => {
   scan.take(kind, data);
+  if (kind === 'picture') picture.show(scan); // before the next one supersedes it
   showSoon();
 }, connection);

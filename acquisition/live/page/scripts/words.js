@@ -2,18 +2,19 @@
 
 import { count, degrees, number, percent } from './format.js';
 
-// Name, and colour class: good, wait (somebody has to do something or wait), bad.
+// Name; colour class: good, wait (somebody has to do something or wait), bad; words where the scan
+// has none of its own.
 export const STATES = {
   measuring: ['Measuring', 'good'],
   pausing: ['Pausing', 'wait'],
-  paused: ['Paused', 'wait'],
+  paused: ['Paused', 'wait', 'Nothing moves until it is resumed.'],
   operator: ['Waiting for the operator', 'wait'],
   ending: ['Ending', 'wait'],
   finished: ['Finished', 'good'],
   stopped: ['Stopped by the operator', 'wait'],
   failed: ['Ended by a fault', 'bad'],
   lost: ['The scan no longer answers', 'bad'],
-  aiming: ['Aiming', 'good'],
+  aiming: ['Aiming', 'good', 'Turn the lens; Ctrl-C in the terminal ends it.'],
 };
 
 export const ENDED = ['finished', 'stopped', 'failed', 'lost'];

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from instrument.config.load import load_protocol
 from tests.support.live.chromium import Windows, missing
@@ -24,9 +25,11 @@ def run(tmp_path: Path) -> Path:
     live_protocol(tmp_path, keep_frames=True)
     rig, protocol = tmp_path / "small_rig.yaml", tmp_path / "small.yaml"
     rig.write_text(re.sub(r"min_exposure_s: \S+", "min_exposure_s: 0.012", rig.read_text()))
-    text = protocol.read_text().replace("[30.0, 60.0]", "[30.0]")
-    text = text.replace("sigma_deg: 20.0, ks: 0.076", "sigma_deg: 6.0, ks: 0.5")
-    protocol.write_text(text)
+    wanted = yaml.safe_load(protocol.read_text())
+    wanted["sweeps"][0]["theta_i_deg"] = [30.0]
+    wanted["simulated_sample"]["model"] = "oren_nayar+torrance_sparrow"
+    wanted["simulated_sample"]["parameters"] = {"albedo": 0.8, "sigma_deg": 6.0, "ks": 0.5}
+    protocol.write_text(yaml.safe_dump(wanted))
     return whole_run(load_protocol(protocol), tmp_path / "run")
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from instrument.record.record import Record
 from tests.support.command import gonio
 from tests.support.live.chromium import Windows, missing
 from tests.support.live.live_scan import live_command
@@ -43,6 +44,14 @@ def rig(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.fixture
+def protocol(tmp_path: Path) -> Path:
+    """The small demonstration, with models that are fitted quickly."""
+    path = small_demo(tmp_path)
+    path.write_text(f"{path.read_text()}fit: {{models: [lambert, oren_nayar]}}\n")
+    return path
+
+
 def readings(run: Path) -> int:
     with sqlite3.connect(f"file:{run / 'record.sqlite'}?mode=ro", uri=True) as record:
         return int(record.execute("SELECT COUNT(*) FROM reading").fetchone()[0])
@@ -54,10 +63,10 @@ def points_shown(page: Page) -> int:
 
 
 def test_a_scan_is_paused_resumed_and_aborted_on_the_page(
-    windows: Windows, tmp_path: Path, rig: Path
+    windows: Windows, tmp_path: Path, protocol: Path, rig: Path
 ) -> None:
     run = tmp_path / "run"
-    arguments = ("run", small_demo(tmp_path), "--rig", rig, "--out", run, "--live")
+    arguments = ("run", protocol, "--rig", rig, "--out", run, "--live")
     with live_command(tmp_path / "said", *arguments) as scan:
         page = windows.open(scan.address)
         state, note = page.locator("#state-name"), page.locator("#chart-note")
@@ -87,7 +96,9 @@ def test_a_scan_is_paused_resumed_and_aborted_on_the_page(
     assert paused_at < readings(run) < 17
     done = gonio("resume", run, "--yes", "--json")
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["verdict"] == "adequate"
+    assert json.loads(done.stdout)["verdict"] == "none adequate"  # the sample is glossy
+    with Record.open(run) as record:
+        assert sum(r.kind == "point" for r in record.rows().readings) == 17
 
 
 def test_the_lens_is_aimed_with_the_emulated_camera(

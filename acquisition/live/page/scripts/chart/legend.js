@@ -76,5 +76,8 @@ function note(scan, curves) {
   const outside = flagged
     ? ' Flagged points without a value, or beyond the axis, stand at its edge.'
     : '';
-  return `${counts}${outside} Error bars: standard uncertainty u (k = 1), often smaller than the symbols.`;
+  const pale = points.some((point) => point.provisional)
+    ? ' Pale points may still change: their white tile is not read yet.'
+    : '';
+  return `${counts}${outside}${pale} Error bars: standard uncertainty u (k = 1), often smaller than the symbols.`;
 }

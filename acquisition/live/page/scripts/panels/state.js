@@ -7,10 +7,11 @@ import { ENDED, STATES } from '../words.js';
 export function showState(scan) {
   const { progress } = scan;
   if (!progress) return;
-  const [name, looks] = STATES[progress.state] ?? [progress.state, 'wait'];
+  const [name, looks, words = ''] = STATES[progress.state] ?? [progress.state, 'wait'];
   write('state-name', name);
   by('state-name').className = `pill ${looks}`;
-  const text = progress.text === progress.state ? '' : progress.text;
+  const own = progress.text && progress.text !== progress.state;
+  const text = own ? progress.text : words;
   write('state-text', text);
   announce(progress.state, `${name}. ${text}`);
   showTitle(scan, name);
