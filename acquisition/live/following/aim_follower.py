@@ -20,7 +20,8 @@ _RUN = {
     "range_deg": [0.0, 0.0],
     "aiming": True,
 }
-_COUNTS = (
+_AIM = (
+    *("sharpness", "best_sharpness"),
     *("saturated_pixels", "window_saturated_pixels", "window_mean_dn", "peak_dn"),
     *("full_scale_dn", "exposure_s"),
 )
@@ -32,7 +33,6 @@ class AimFollower(Follower):
 
     def __init__(self, scan: ScanWatch, board: Board) -> None:
         super().__init__(scan, board)
-        self._best_sharpness = 0.0
         self._begun = False
         board.put("run", "run", _RUN)
 
@@ -40,10 +40,8 @@ class AimFollower(Follower):
         """Look once, and put on the board what is new."""
         self.scan.poll()
         picture = None if self.scan.state is None else self.scan.state["picture"]
-        if picture is not None and picture["sharpness"] is not None:
-            self._best_sharpness = max(self._best_sharpness, picture["sharpness"])
-            aim = {name: picture[name] for name in ("sharpness", *_COUNTS)}
-            self._board.put("aim", "aim", {**aim, "best_sharpness": self._best_sharpness})
+        if picture is not None:
+            self._board.put("aim", "aim", {name: picture[name] for name in _AIM})
         self._put_progress()
 
     def _put_progress(self) -> None:

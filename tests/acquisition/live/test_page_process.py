@@ -103,7 +103,7 @@ def test_a_camera_is_aimed(tmp_path: Path, own_folder: Path) -> None:
         with Browser(address) as browser:
             assert browser.last_id is None
             for sharpness, best in ((0.3, 0.3), (0.5, 0.5), (0.2, 0.5)):
-                side.show(1000, sharpness=sharpness)
+                side.show(1000, sharpness=sharpness, best_sharpness=best)
                 browser.read_until(
                     lambda one, s=sharpness: (one.of("aim") or {}).get("sharpness") == s
                 )
@@ -135,4 +135,17 @@ def test_a_page_that_fails_says_why_and_hinders_nothing(
     with live_page(tmp_path / "no run"):
         (page,) = children()
         os.waitid(os.P_PID, page, os.WEXITED | os.WNOWAIT)
+    assert "the live page had ended early: " in capfd.readouterr().err
+
+
+def test_a_page_that_is_killed_leaves_the_scan_as_it_is(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    loaded, run = live_protocol(tmp_path), tmp_path / "run"
+    with begun_run(loaded, run) as record:
+        with live_page(run) as address, Browser(address) as browser:
+            browser.read_until(lambda one: one.of("progress") is not None)
+            os.kill(*children(), signal.SIGKILL)
+            scan(loaded, record)
+        assert len(record.readings()) == 16
     assert "the live page had ended early: " in capfd.readouterr().err

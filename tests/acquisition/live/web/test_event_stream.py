@@ -12,9 +12,12 @@ from acquisition.live.address import address, listening_socket, port_of
 from acquisition.live.following.board import Board
 from acquisition.live.web.app import Shown, live_app
 from acquisition.live.web.server import WebServer
+from instrument.record.event_kinds import FINISHED
 from tests.support.live.page_client import Browser
-from tests.support.live.pages import TOKEN
+from tests.support.live.pages import TOKEN, served
+from tests.support.live.runs import begun_run, live_protocol
 from tests.support.timing.deadline import wait_for
+from tests.support.whole_scans.stopped_scan import scan
 
 MODEL = "model"
 
@@ -32,6 +35,26 @@ def test_a_reload_and_a_second_browser_show_what_the_first_does(page: str) -> No
     assert first.shown == second.shown == again.shown
     assert first.of("progress")["state"] == "finished"
     assert not first.of("progress")["actions"]
+
+
+def test_browsers_that_come_while_a_run_grows_agree(tmp_path: Path) -> None:
+    loaded, run = live_protocol(tmp_path), tmp_path / "run"
+    with begun_run(loaded, run) as record, served(run) as page, ExitStack() as stack:
+        browsers = [stack.enter_context(Browser(page))]
+        for upto in (0, 4, 9, 15):
+            scan(loaded, record, upto=upto)
+            browsers.append(stack.enter_context(Browser(page)))
+            browsers[0].read_until(lambda one, n=upto: len(one.points()) == n + 1)
+        record.add_event("2026-11-28T05:00:00+00:00", FINISHED, "16 steps")
+        for browser in browsers:
+            browser.read_until(is_complete)
+    assert all(browser.shown == browsers[0].shown for browser in browsers)
+    assert len(browsers[0].ids) > len(browsers[-1].ids)
+
+
+def is_complete(browser: Browser) -> bool:
+    model, progress = browser.of(MODEL), browser.of("progress")
+    return bool(model and progress and model["points"] == 10 and progress["state"] == "finished")
 
 
 def test_a_browser_that_comes_back_gets_what_it_has_missed(page: str) -> None:
