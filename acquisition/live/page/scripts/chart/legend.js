@@ -79,5 +79,7 @@ function note(scan, curves) {
   const pale = points.some((point) => point.provisional)
     ? ' Pale points may still change: their white tile is not read yet.'
     : '';
-  return `${counts}${outside}${pale} Error bars: standard uncertainty u (k = 1), often smaller than the symbols.`;
+  const side = scan.run?.sweep === 'theta_r' ? ' Positive θᵣ at Δφ = 0 is the lamp’s side.' : '';
+  const bars = ' Error bars: standard uncertainty u (k = 1), often smaller than the symbols.';
+  return counts + outside + pale + side + bars;
 }
