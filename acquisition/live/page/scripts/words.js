@@ -11,7 +11,7 @@ export const STATES = {
   operator: ['Waiting for the operator', 'wait'],
   ending: ['Ending', 'wait'],
   finished: ['Finished', 'good'],
-  stopped: ['Stopped by the operator', 'wait'],
+  stopped: ['Stopped', 'wait'],
   failed: ['Ended by a fault', 'bad'],
   lost: ['The scan no longer answers', 'bad'],
   aiming: ['Aiming', 'good', 'Turn the lens; Ctrl-C in the terminal ends it.'],

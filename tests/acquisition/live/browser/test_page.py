@@ -97,6 +97,8 @@ def test_the_saturated_point_is_named_in_words(windows: Windows, served: Message
     entry.get_by_role("button").click()
     expect(page.locator("#selected-title")).to_have_text("Selected: θᵢ 60°, θᵣ −40°")
     expect(page.locator("#selected-flags")).to_contain_text("Not fitted.")
+    kept = page.locator("#selected-caption")
+    expect(kept).to_have_text("No frame of this reading was kept.")
     facts = page.locator("#selected-facts")
     expect(facts).to_contain_text("4095 of 4095 DN (100 %)")
     expect(facts).to_contain_text("12.3 ms, 4 frames")
@@ -139,7 +141,7 @@ def test_the_scan_says_which_buttons_there_are(windows: Windows, served: Message
     expect(shown).to_have_text([re.compile("Resume"), re.compile("Abort")])
     served.tell("progress", progress(5, "stopped"))
     expect(shown).to_have_count(0)
-    expect(page.locator("#state-name")).to_have_text("Stopped by the operator")
+    expect(page.locator("#state-name")).to_have_text("Stopped")
 
 
 def test_abort_asks_once_and_a_refusal_is_shown(windows: Windows, served: MessagePage) -> None:

@@ -86,7 +86,7 @@ def test_a_scan_is_paused_resumed_and_aborted_on_the_page(
         page.get_by_role("button", name="Abort…").click()
         page.get_by_role("button", name="Abort the scan").click()
         assert scan.exit_code() == 4
-        expect(state).to_have_text("Stopped by the operator")
+        expect(state).to_have_text("Stopped")
         expect(page.locator("#buttons button:visible")).to_have_count(0)
         expect(page.locator("#state-text")).to_contain_text(f"gonio resume {run}")
         assert "all motion has ended" in re.sub(r"\s+", " ", scan.said)

@@ -64,7 +64,7 @@ export class Chart {
       ...this.size(),
       scales: { x: { time: false, range: () => this.x }, y: { range: () => this.y } },
       series: [{}, { show: true, paths: () => null, points: { show: false } }],
-      axes: [axis(xLabel, 34, '°'), axis(yLabel, 62, '')],
+      axes: [axis(xLabel, 34, '°'), axis(yLabel, widthOf, '')],
       legend: { show: false },
       cursor: { show: false },
       hooks: { draw: [(plot) => drawCurves(frameOf(plot), this.curves, this.selected)] },
@@ -104,6 +104,9 @@ function axis(label, size, unit) {
     values: (plot, splits, index, space, step) => splits.map((v) => tick(v, step) + unit),
   };
 }
+
+// Width of the numbers beside the axis, in CSS pixels.
+const widthOf = (plot, words) => 16 + 8 * Math.max(3, ...(words ?? []).map((word) => word.length));
 
 // All numbers of an axis with the decimals that its step needs.
 function tick(value, step) {

@@ -52,15 +52,15 @@ function valueName(run, point) {
 
 function showFrame(point) {
   const image = by('selected-frame');
-  show('selected-frame', point.has_frame);
-  write(
-    'selected-caption',
-    point.has_frame
-      ? `Frame of this reading, ${place(point)}`
-      : 'No frame of this reading was kept.',
-  );
   const source = point.has_frame ? frameAddress(point.step) : '';
-  if (!source || image.getAttribute('src') === source) return;
-  image.src = source;
+  if (image.dataset.of === source) return;
+  image.dataset.of = source;
+  const caption = (words) => write('selected-caption', words);
+  image.onload = () => show('selected-frame', true);
+  image.onerror = () => caption('The frame of this reading cannot be fetched.');
+  show('selected-frame', false);
+  caption(source ? `Frame of this reading, ${place(point)}` : 'No frame of this reading was kept.');
+  if (source) image.src = source;
+  else image.removeAttribute('src');
   image.alt = `Frame of ${place(point)}`;
 }

@@ -60,11 +60,12 @@ const CONNECTION = {
 };
 
 export function showConnection(connection, scan) {
-  const ended = connection === 'lost' && ENDED.includes(scan.progress?.state);
-  const words = ended
-    ? 'The page’s server has ended, as the scan has. gonio watch shows the run again.'
+  const over = connection === 'lost' && ENDED.includes(scan.progress?.state);
+  const words = over
+    ? `The page has ended, as the scan has; gonio watch ${scan.run?.folder ?? ''} shows the run again.`
     : CONNECTION[connection];
   write('connection', words);
   show('connection', words !== '');
-  document.body.classList.toggle('stale', connection !== 'open');
+  by('connection').classList.toggle('calm', over);
+  document.body.classList.toggle('stale', connection !== 'open' && !over);
 }
