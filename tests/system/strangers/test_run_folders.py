@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from acquisition.commands.scan import report_run, resume_run
+from acquisition.live.following.board import Board
+from acquisition.live.following.run_follower import RunFollower
+from acquisition.live.following.run_reader import RunReader
 from acquisition.results.sources import Wanted, read_source
 from instrument.errors import GonioError, InputError, NotDetermined
 from instrument.record.record import FILE_NAME
@@ -27,10 +31,19 @@ def sent(run: Path, tmp_path: Path) -> Sent:
     return copy_of(run, tmp_path)
 
 
+def shown(folder: Path) -> list[Any]:
+    """Return what the live page of a run shows, without the model."""
+    board = Board()
+    with RunReader(folder) as reader, RunFollower(reader, board) as follower:
+        follower.poll()
+        return [m.data for m in board.after(0, 10**9) if m.kind != "model"]
+
+
 WAYS: dict[str, Callable[[Path], object]] = {
     "report": lambda folder: report_run(folder, as_json=True),
     "resume": lambda folder: resume_run(folder, yes=True, as_json=True),
     "fit": lambda folder: read_source(folder, Wanted(format="run")),
+    "watch": shown,
 }
 
 
@@ -92,6 +105,16 @@ def test_harmless_contents_are_shown_as_text(sent: Sent) -> None:
     assert "of 99999 readings" in page
 
 
+def test_the_live_page_of_hostile_texts_is_one_of_texts(sent: Sent) -> None:
+    """JSON carries them: the page's script writes them as text, see `test_page`."""
+    hostile = f"{SCRIPT}\n\nevent: run\ndata: \x1b[2J"
+    sent.sql(f"UPDATE event SET text = '{hostile}'")
+    events = [data for data in shown(sent.folder) if data and {"kind", "text"} <= data.keys()]
+    texts = [event["text"] for event in events]
+    assert texts
+    assert all(text.startswith(SCRIPT) and "\x1b" not in text for text in texts)
+
+
 def test_results_replace_links_and_do_not_follow_them(sent: Sent) -> None:
     names = ("measurements.csv", "fit.json", "report.html")
     for name in names:
@@ -118,6 +141,7 @@ def test_impossible_but_well_formed_values_give_a_result_or_a_named_error(
     sent.forge(f"UPDATE reading SET {change}")
     named = ("a result", "NotDetermined", "AllFlagged")
     assert _outcome(WAYS["fit"], sent.folder) in named
+    assert shown(sent.folder)[-1]["state"] in ("finished", "lost")
 
 
 def test_a_report_of_impossible_values_says_that_nothing_was_fitted(sent: Sent) -> None:
