@@ -10,7 +10,6 @@ from pathlib import Path
 
 from acquisition.interlocks import doubt, frame_scatter, lamp_checks, no_light
 from acquisition.measure import radiometry, stray_light
-from acquisition.results import reduction
 from tests.support.paths import ROOT
 
 LIVE = ROOT / "acquisition" / "live"
@@ -97,8 +96,8 @@ def test_every_flag_of_a_reading_has_words() -> None:
     flags = {
         "saturated", "hot pixels", "dead pixels", radiometry.LEAVES_FRAME, radiometry.FEW_PIXELS,
         stray_light.LEAVES, stray_light.BRIGHT, frame_scatter.FLAG, doubt.DOUBTED,
-        no_light.NO_SIGNAL, lamp_checks.UNPROVEN, lamp_checks.STOPPED, reduction.NO_TILE_YET,
+        no_light.NO_SIGNAL, lamp_checks.UNPROVEN, lamp_checks.STOPPED,
     }  # fmt: skip
     text = (PAGE / "scripts" / "words.js").read_text()
     table = text.partition("const FLAGS = {")[2].partition("\n};")[0]
-    assert set(re.findall(r"^  '?([\w ]+?)'?: \(", table, re.M)) == flags
+    assert set(re.findall(r"^  '?([\w ]+?)'?: \[", table, re.M)) == flags

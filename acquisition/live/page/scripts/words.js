@@ -19,38 +19,70 @@ export const STATES = {
 
 export const ENDED = ['finished', 'stopped', 'failed', 'lost'];
 
-// Each flag of a reading: what was seen, and what to look at. Others are shown as they are.
+// Each flag of a reading: what was seen, and what it means or what to do. Others are shown as they are.
 const FLAGS = {
-  saturated: (p) => `${saturated(p)}. Lower exposure_target, close the aperture or dim the lamp.`,
-  'window leaves frame': () => 'the measured window leaves the picture. Look at the camera’s aim.',
-  'too few pixels': (p) => `the window covers only ${number(p.window_pixels, 3)} pixels.`,
-  'hot pixels': () => 'hot pixels cover too much of the window.',
-  'dead pixels': () => 'dead pixels cover too much of the window.',
-  'no signal': () => 'no light was measured. Look at the lamp and its shutter.',
-  'no white tile yet': () => 'the white tile that its BRDF needs has not been measured yet.',
-  'dark patch leaves frame': () =>
-    'the dark patch, which measures stray light, leaves the picture.',
-  'dark patch is bright': () => 'the dark patch, which measures stray light, is lit.',
-  'frames differ': () => 'its frames differ by more than their noise. Look for flicker or motion.',
-  'not at its place in the next picture': () =>
-    'the next picture shows the sample elsewhere. Look at the stage.',
-  'lamp failed at the next reference': () => 'the lamp failed before the next reference.',
-  interlock: () => 'an interlock ended the scan here.',
+  saturated: [
+    saturated,
+    'The true value is higher; lower exposure_target, close the aperture or dim the lamp.',
+  ],
+  'window leaves frame': ['the measured window leaves the picture', 'Look at the camera’s aim.'],
+  'too few pixels': [
+    (p) => `the window covers only ${number(p.window_pixels, 3)} pixels`,
+    'View it less obliquely, or choose a larger window.',
+  ],
+  'hot pixels': [
+    'hot pixels cover too much of the window',
+    'Cool the camera or use a shorter exposure.',
+  ],
+  'dead pixels': ['dead pixels cover too much of the window', 'Move the window in the picture.'],
+  'no signal': ['no light was measured', 'Look at the lamp and its shutter.'],
+  'dark patch leaves frame': [
+    'the dark patch, which measures stray light, leaves the picture',
+    'Look at the camera’s aim.',
+  ],
+  'dark patch is bright': [
+    'the dark patch, which measures stray light, is lit',
+    'Look at what shines on it.',
+  ],
+  'frames differ': [
+    'its frames differ by more than their noise',
+    'Look for flicker of the lamp or motion.',
+  ],
+  'not at its place in the next picture': [
+    'the next picture shows the sample elsewhere',
+    'Look at the stage; a resume measures it again.',
+  ],
+  'lamp failed at the next reference': [
+    'the lamp failed before the next reference',
+    'Look at the lamp; a resume measures it again.',
+  ],
+  interlock: ['an interlock ended the scan here', 'The last events say why.'],
 };
+const OF_TILE = [
+  'the white tile that its BRDF needs is flagged',
+  'Look at the tile’s own reading.',
+];
 
 function saturated(point) {
   const peak = `${number(point.peak_dn)} of ${point.full_scale_dn} DN`;
   if (point.saturated_pixels > 0) {
-    return `${count(point.saturated_pixels, 'pixel')} at full scale (peak ${peak}): the true value is higher`;
+    return `${count(point.saturated_pixels, 'pixel')} of ${count(point.frames, 'frame')} at full scale (peak ${peak})`;
   }
   const share = percent(point.peak_dn / point.full_scale_dn);
   return `its brightest pixel has ${peak} (${share}), too near full scale to be trusted`;
 }
 
+const meaningOf = (flag) => FLAGS[flag] ?? (flag.startsWith('white tile ') ? OF_TILE : []);
+
 export function flagInWords(flag, point) {
-  if (flag.startsWith('white tile ')) return `${flag}: its BRDF needs that reading of the tile.`;
-  const words = FLAGS[flag]?.(point);
-  return words ? `${flag}: ${words}` : `${flag}.`;
+  const [seen] = meaningOf(flag);
+  if (!seen) return flag;
+  return `${flag}: ${typeof seen === 'function' ? seen(point) : seen}`;
+}
+
+export function adviceOn(flag) {
+  const [, advice] = meaningOf(flag);
+  return advice ?? '';
 }
 
 const SURFACES = { tile: 'White tile', drift: 'Drift check' };

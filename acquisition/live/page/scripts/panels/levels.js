@@ -10,7 +10,7 @@ export function showLevels(scan) {
   show('camera-facts', Boolean(now));
   if (!now) return;
   level('window-mean', 'Window mean', now.window_mean_dn, now.full_scale_dn);
-  level('peak', 'Peak of the window', now.peak_dn, now.full_scale_dn);
+  level('peak', 'Brightest pixel', now.peak_dn, now.full_scale_dn);
   write('saturation', saturationInWords(now));
   by('saturation').classList.toggle('bad', now.saturated_pixels > 0);
   write('exposure', exposure(now.exposure_s));

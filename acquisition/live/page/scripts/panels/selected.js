@@ -4,7 +4,7 @@ import { flagSwatch } from '../chart/symbols.js';
 import { by, fill, make, show, write } from '../dom.js';
 import { degrees, exposure, number, percent, timeOfDay, withU } from '../format.js';
 import { frameAddress } from '../requests.js';
-import { flagInWords, place } from '../words.js';
+import { adviceOn, flagInWords, place } from '../words.js';
 
 export function showSelected(scan, point) {
   show('selected', point !== null);
@@ -18,12 +18,8 @@ export function showSelected(scan, point) {
 }
 
 function flagRow(flag, point) {
-  return make(
-    'li',
-    { className: 'flagged' },
-    flagSwatch(),
-    `${flagInWords(flag, point)} Not fitted.`,
-  );
+  const words = `${flagInWords(flag, point)}. Not fitted. ${adviceOn(flag)}`;
+  return make('li', { className: 'flagged' }, flagSwatch(), words);
 }
 
 const factRow = ([name, value]) => [make('dt', {}, name), make('dd', {}, value)];
