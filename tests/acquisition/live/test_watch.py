@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import subprocess
@@ -50,9 +51,9 @@ def test_a_run_that_has_ended_is_shown_without_actions_until_ctrl_c(tmp_path: Pa
     assert {path: path.stat().st_mtime_ns for path in run.iterdir()} == before
 
 
-def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "acquisition", "watch", str(tmp_path)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+def test_what_is_no_run_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "nice", lambda _: 0)
+    done = gonio_here("watch", tmp_path)
     assert done.returncode == 2
     assert done.stderr == f"{tmp_path}: no record.sqlite there: name the folder of a run\n"
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition.live.following.board import Board
@@ -24,6 +24,7 @@ def seen(board: Board, after: int, most_bytes: int = 10**6) -> list[tuple[int, M
     return found
 
 
+@settings(max_examples=50)
 @given(puts=PUTS, joined=st.integers(0, 60), most_bytes=st.integers(1, 300))
 def test_whoever_reads_whenever_has_the_same_in_the_end(
     puts: list[tuple[str, int]], joined: int, most_bytes: int
@@ -41,6 +42,7 @@ def test_whoever_reads_whenever_has_the_same_in_the_end(
     assert early == late == {key: {"key": key, "value": value} for key, value in puts}
 
 
+@settings(max_examples=30)
 @given(puts=PUTS)
 def test_numbers_rise_and_each_key_comes_once(puts: list[tuple[str, int]]) -> None:
     board = Board()

@@ -42,11 +42,11 @@ class Fits:
 
 
 @contextmanager
-def fitted() -> Iterator[tuple[ModelThread, Fits, Board]]:
+def fitted(share: float = 0.2) -> Iterator[tuple[ModelThread, Fits, Board]]:
     fits, board, nothing = Fits(), Board(), SimpleNamespace()
     with (
         patch.object(model_thread, "model_content", fits),
-        ModelThread(board, nothing, nothing, share=0.2) as thread,
+        ModelThread(board, nothing, nothing, share) as thread,
     ):
         yield thread, fits, board
 
@@ -75,14 +75,11 @@ def test_only_the_newest_points_are_fitted_and_an_offer_never_waits() -> None:
 
 
 def test_the_last_points_are_fitted_without_a_pause() -> None:
-    with fitted() as (thread, fits, _):
-        begun_s = time.monotonic()
+    with fitted(share=1e-4) as (thread, fits, _):  # the pause would take minutes
         thread.offer("first")
         wait_for(lambda: fits.given == ["first"], "the first fit")
         thread.offer("all", last=True)
         wait_for(lambda: fits.given == ["first", "all"], "the last fit")
-        # The pause after the first fit would have been four times its processor time.
-        assert fits.used_s > 0.21 * (time.monotonic() - begun_s)
 
 
 def test_an_end_does_not_wait_for_ever() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
@@ -21,9 +22,15 @@ from tests.support.storage.older_records import seal_again
 STEP = 6  # a point of which the record itself holds no picture
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("kept")
+    return whole_run(live_protocol(folder, keep_frames=True), folder / "run")
+
+
 @pytest.fixture
-def run(tmp_path: Path) -> Path:
-    return whole_run(live_protocol(tmp_path, keep_frames=True), tmp_path / "run")
+def run(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made, tmp_path / "run"))
 
 
 @pytest.fixture
