@@ -29,10 +29,10 @@ pytestmark = [pytest.mark.waits, pytest.mark.usefixtures("own_folder")]
 LONG_S = 60.0
 
 
-def children() -> list[int]:
-    """Processes of this process's own."""
+def pages() -> list[int]:
+    """Page processes of this process's own."""
     own = Path(f"/proc/self/task/{os.getpid()}/children").read_text()
-    return [int(word) for word in own.split()]
+    return [int(n) for n in own.split() if "acquisition.live" in _command_line(int(n))]
 
 
 def is_refused(address: str) -> bool:
@@ -48,14 +48,14 @@ def test_a_browser_gets_the_last_point_and_its_model_before_the_page_ends(tmp_pa
             browser = stack.enter_context(Browser(address))
             browser.read_until(lambda one: one.of("progress") is not None)
             assert browser.of("progress")["state"] == "measuring"
-            (page,) = children()
+            (page,) = pages()
             assert os.getpriority(os.PRIO_PROCESS, page) > os.getpriority(os.PRIO_PROCESS, 0)
             assert address.rpartition("=")[2] not in _command_line(page)
             os.kill(page, signal.SIGINT)  # a Ctrl-C is for the scan
             scan(loaded, record)
             record.add_event("2026-11-28T05:00:00+00:00", FINISHED, "16 steps")
         assert is_refused(address)
-        assert children() == []
+        assert pages() == []
         while browser.read_event():
             pass
     assert browser.of("progress")["state"] == "finished"
@@ -133,7 +133,7 @@ def test_a_page_that_fails_says_why_and_hinders_nothing(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with live_page(tmp_path / "no run"):
-        (page,) = children()
+        (page,) = pages()
         os.waitid(os.P_PID, page, os.WEXITED | os.WNOWAIT)
     assert "the live page had ended early: " in capfd.readouterr().err
 
@@ -145,7 +145,7 @@ def test_a_page_that_is_killed_leaves_the_scan_as_it_is(
     with begun_run(loaded, run) as record:
         with live_page(run) as address, Browser(address) as browser:
             browser.read_until(lambda one: one.of("progress") is not None)
-            os.kill(*children(), signal.SIGKILL)
+            os.kill(*pages(), signal.SIGKILL)
             scan(loaded, record)
         assert len(record.readings()) == 16
     assert "the live page had ended early: " in capfd.readouterr().err
