@@ -64,12 +64,12 @@ const OF_TILE = [
 ];
 
 function saturated(point) {
-  const peak = `${number(point.peak_dn)} of ${point.full_scale_dn} DN`;
+  const part = `${number(point.peak_dn)} of ${point.full_scale_dn} DN`;
   if (point.saturated_pixels > 0) {
-    return `${count(point.saturated_pixels, 'pixel')} of ${count(point.frames, 'frame')} at full scale (peak ${peak})`;
+    return `${count(point.saturated_pixels, 'pixel')} of ${count(point.frames, 'frame')} at full scale (brightest part ${part})`;
   }
   const share = percent(point.peak_dn / point.full_scale_dn);
-  return `its brightest pixel has ${peak} (${share}), too near full scale to be trusted`;
+  return `its brightest part has ${part} (${share}), too near full scale to be trusted`;
 }
 
 const meaningOf = (flag) => FLAGS[flag] ?? (flag.startsWith('white tile ') ? OF_TILE : []);

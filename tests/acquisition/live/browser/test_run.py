@@ -41,7 +41,9 @@ def test_the_page_alone_tells_which_point_is_saturated(windows: Windows, run: Pa
         entry = page.locator("#attention-list li")
         expect(entry).to_have_count(1)
         expect(entry).to_contain_text("θᵢ 30°, θᵣ −40° saturated: ")
-        expect(entry).to_contain_text("pixels of 4 frames at full scale (peak 4095 of 4095 DN)")
+        expect(entry).to_contain_text(
+            "pixels of 4 frames at full scale (brightest part 4095 of 4095 DN)"
+        )
         entry.get_by_role("button").click()
         frame = page.locator("#selected-frame")
         expect(frame).to_be_visible()

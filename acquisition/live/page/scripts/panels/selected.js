@@ -30,7 +30,7 @@ function facts(run, point) {
   return [
     [valueName(run, point), withU(point.value, point.u, run?.unit ?? '')],
     ['Mean, dark subtracted', mean],
-    ['Brightest pixel', peak],
+    ['Brightest part', peak],
     ['Saturated pixels', String(point.saturated_pixels)],
     ['Exposure', `${exposure(point.exposure_s)}, ${point.frames} frames`],
     ['Window', `${number(point.window_pixels)} pixels`],
