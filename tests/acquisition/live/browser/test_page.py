@@ -69,7 +69,7 @@ def test_the_curves_grow_and_a_reload_shows_them_whole(
     drawn, shown = chart_picture(page), text_of(page, *SHOWN)
     page.reload()
     expect(note).to_contain_text(f"{POINTS} of {POINTS} points measured, 1 flagged")
-    expect(page.locator("#state-text")).to_have_text("said by the scan: measuring")
+    expect(page.locator("#state-text")).to_have_text("Said by the scan: measuring")
     assert (chart_picture(page), text_of(page, *SHOWN)) == (drawn, shown)
 
 

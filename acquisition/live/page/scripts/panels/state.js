@@ -11,12 +11,15 @@ export function showState(scan) {
   write('state-name', name);
   by('state-name').className = `pill ${looks}`;
   const own = progress.text && progress.text !== progress.state;
-  const text = own ? progress.text : words;
+  const text = own ? capitalised(progress.text) : words;
   write('state-text', text);
   announce(progress.state, `${name}. ${text}`);
   showTitle(scan, name);
   showProgress(progress);
 }
+
+// Symbols such as θ stay what they are.
+const capitalised = (text) => text.replace(/^[a-z]/, (letter) => letter.toUpperCase());
 
 // Read aloud when the state changes, not at every point.
 let announced = null;
