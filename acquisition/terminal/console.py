@@ -49,8 +49,8 @@ def print_notes(notes: Iterable[str]) -> None:
 
 def ask(question: str) -> str:
     """Print a question and return the stripped answer; raise `EOFError` at the end of input."""
-    console.print(question, end=" ", highlight=False, soft_wrap=True)
-    with line_typed():
+    with line_typed():  # before the question: an answer may come at once
+        console.print(question, end=" ", highlight=False, soft_wrap=True)
         return console.input("").strip()
 
 
