@@ -209,8 +209,8 @@ class ScanMachine(RuleBasedStateMachine):
     def _opened(self, loaded: Loaded) -> Devices:
         return wired(open_devices(loaded), self.wire)
 
-    def _made(self, *arguments: Any) -> Engine:
-        self.engine = Engine(*arguments)
+    def _made(self, *arguments: Any, **options: Any) -> Engine:
+        self.engine = Engine(*arguments, **options)
         return self.engine
 
     def _ended(self, end: str) -> None:
