@@ -22,6 +22,8 @@ from unittest.mock import patch
 from acquisition.entry import main
 from tests.support.paths import ROOT
 
+_stop_thread_fd = [-1]  # its end of the pipe, once a command has started the thread
+
 
 def gonio(*arguments: object) -> subprocess.CompletedProcess[str]:
     """Run the command from the project's folder, without a terminal."""
@@ -86,13 +88,18 @@ def _text(number: int, encoding: str) -> TextIOWrapper:
 
 @contextlib.contextmanager
 def own_signals() -> Iterator[None]:
-    """Restore the handlers that the command replaces."""
+    """Restore the handlers that the command replaces, and keep its stop thread to the command.
+
+    That thread would take two signals of other tests for those of a command that hangs.
+    """
     stops = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
     before = {number: signal.getsignal(number) for number in stops}
+    signal.set_wakeup_fd(_stop_thread_fd[0], warn_on_full_buffer=False)
     try:
         with patch.object(sys, "unraisablehook", sys.unraisablehook):
             yield
     finally:
+        _stop_thread_fd[0] = max(signal.set_wakeup_fd(-1), _stop_thread_fd[0])
         for number, handler in before.items():
             signal.signal(number, handler)
 
