@@ -140,6 +140,7 @@ class Record(Closeable):
 
     def rows(self) -> Rows:
         """Return readings, checks and events of one moment, whatever is written meanwhile."""
+        self.writing.wait()
         self._db.execute("BEGIN")
         try:
             return Rows(self.readings(), self.checks(), list(self.events()))
