@@ -16,6 +16,8 @@ from acquisition.commands.setup import require_rig
 from acquisition.engine.exposure.search import ExposureSearch
 from acquisition.live.aiming import Aiming
 from acquisition.live.channel import user_folder
+from acquisition.live.page_process import live_page
+from acquisition.live.picture import numbers_of
 from acquisition.live.publisher import Publisher
 from acquisition.measure.window import Window, window_at
 from acquisition.plan.exposure_ladder import longest_exposure_s
@@ -56,7 +58,7 @@ def grab_frame(
     if path.suffix.lower() not in (".png", ".tif", ".tiff"):
         raise InputError(f"{path}: --out must end in .png (8 bit, drawn on) or .tiff (raw counts)")
     aimed = Aimed.of(rig_path, protocol_path, theta_r_deg, exposure_s)
-    with aimed.camera() as camera, orderly_end():
+    with aimed.camera() as camera:
         frame, identity = aimed.frame(camera), camera.identity()
     rig, window = aimed.rig, aimed.window
     with orderly_end():  # no half-written file stays
@@ -78,13 +80,10 @@ def aim_camera(
 
     Nothing moves, and no file is written.
     """
-    from acquisition.live.page_process import live_page
-
     aimed = Aimed.of(rig_path, protocol_path, theta_r_deg, exposure_s)
     channel = user_folder() / f"aim-{os.getpid()}"
     with (
         suppress(KeyboardInterrupt),
-        orderly_end(),
         aimed.camera() as camera,
         live_page(channel, aiming=True) as address,
     ):
@@ -132,7 +131,7 @@ class Aimed:
 
     @contextmanager
     def camera(self) -> Iterator[Camera]:
-        """Open the camera in a `with` block."""
+        """Open the camera in a `with` block, which a signal ends in order."""
         restart_for_emulated_camera(self.rig)
         with orderly_end(), OpenRig(self.rig) as open_rig:
             open_rig.pose_scene(self.theta_r_deg)
@@ -144,9 +143,8 @@ class Aimed:
             camera.set_exposure_s(self.exposure_s)
             return camera.grab(1)[0]
         first_s = longest_exposure_s(self._last_s, self.rig.camera)
-        frame = ExposureSearch(camera, self.rig.camera, self.target).frames(first_s, self.window)[
-            -1
-        ]
+        search = ExposureSearch(camera, self.rig.camera, self.target)
+        frame = search.frames(first_s, self.window)[-1]
         self._last_s = frame.exposure_s
         return frame
 
@@ -183,24 +181,25 @@ def _rig_and_patch(
 
 def _statistics(frame: Frame, window: Window, rig: Rig) -> dict[str, float]:
     """Counts of the whole frame and of the window, in DN, by name."""
+    numbers = numbers_of(frame, window, rig.camera)
     inside = frame.image[window.crop][window.counted]
-    if not inside.size:
+    if numbers.window_mean_dn is None:
         raise InputError(
             "gonio grab: the window lies outside the picture: check axis_row_px and "
             "axis_column_px of the rig file"
         )
     return {
-        "exposure_s": frame.exposure_s,
+        "exposure_s": numbers.exposure_s,
         "frame_mean_dn": float(frame.image.mean()),
-        "frame_max_dn": float(frame.image.max()),
-        "window_mean_dn": float(inside.mean()),
+        "frame_max_dn": numbers.peak_dn,
+        "window_mean_dn": numbers.window_mean_dn,
         "window_std_dn": float(inside.std()),
         "window_min_dn": float(inside.min()),
         "window_max_dn": float(inside.max()),
         "window_pixels": window.pixels,
-        "saturated_pixels": float(np.count_nonzero(frame.image >= rig.camera.max_dn)),
-        "window_saturated_pixels": float(np.count_nonzero(inside >= rig.camera.max_dn)),
-        "full_scale_dn": float(rig.camera.max_dn),
+        "saturated_pixels": float(numbers.saturated_pixels),
+        "window_saturated_pixels": float(numbers.window_saturated_pixels),
+        "full_scale_dn": numbers.full_scale_dn,
     }
 
 

@@ -17,7 +17,7 @@ from acquisition.engine.axis import Axis
 from acquisition.engine.exposure.exposer import Exposed, Exposer
 from acquisition.engine.frame_files import write_frames
 from acquisition.engine.frame_reduction import FrameReduction
-from acquisition.engine.onlookers import KnownLamp, Phase, Present
+from acquisition.engine.onlookers import MEASURING, KnownLamp, Phase, Present
 from acquisition.engine.pause import Paused, PauseSwitch
 from acquisition.engine.positioner import Positioner
 from acquisition.engine.preview import make_preview
@@ -128,7 +128,7 @@ class Engine:
         asked = positioner.asked
         if lamp.asked and self._rig.lamp.darkened_by == "hand":
             asked = "Cover the lamp" if lamp.asked == "darkened" else "Uncover the lamp"
-        if phase in ("homing", "moving", "exposing"):
+        if phase in MEASURING:
             phase = "operator" if asked else "pausing" if self._pause.is_on else phase
         return Present(
             phase=phase,

@@ -15,6 +15,8 @@ from acquisition.plan.pose import Pose
 from instrument.devices import Lamp, Surface
 
 Phase = Literal["homing", "moving", "exposing", "pausing", "paused", "operator", "ending"]
+MEASURING: tuple[Phase, ...] = ("homing", "moving", "exposing")
+"""Phases in which the scan goes on by itself."""
 LampState = Literal["lit", "darkened", "unknown"]
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 from acquisition.engine.axis import Axis
 from acquisition.engine.exposure.exposer import Exposed
-from acquisition.engine.onlookers import Present
+from acquisition.engine.onlookers import MEASURING, Present
 from acquisition.engine.pause import PauseSwitch
 from acquisition.live.channel import ABORT, OK, PAUSE, RESUME
 from acquisition.live.publisher import Seen, State
@@ -24,7 +24,6 @@ _PHASES = {  # of the engine, in the page's words
     "operator": "waiting for the operator",
     "ending": "the rig is made safe",
 }
-_MEASURING = ("homing", "moving", "exposing")
 _KINDS = {"point": "sample", "tile": "white tile", "drift": "drift check"}
 
 
@@ -32,9 +31,7 @@ def state_of(present_state: Callable[[], Present], axes: Mapping[str, Axis]) -> 
     """Return the state of scan and rig for the page; angles in degrees, None where unknown."""
     present = present_state()
     return {
-        "phase": "measuring"
-        if present.phase in ("homing", "moving", "exposing")
-        else present.phase,
+        "phase": "measuring" if present.phase in MEASURING else present.phase,
         "text": present.asked or _PHASES[present.phase],
         "step": None if present.step is None else present.step.index,
         "axes": {name: _axis(name, axis, present) for name, axis in axes.items()},

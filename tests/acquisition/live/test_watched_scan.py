@@ -41,6 +41,17 @@ def scanning(run: Path) -> Iterator[tuple[subprocess.Popen[str], Path]]:
             process.kill()
 
 
+@contextmanager
+def paused_at_a_terminal(run: Path) -> Iterator[TerminalSession]:
+    """Run the demonstration at a terminal, and press the key that pauses it, once it is told."""
+    command = ("-m", "acquisition", "run", small_demo(run.parent), "--out", run)
+    with TerminalSession(command) as session:
+        session.read_until("p pauses the scan and lets it go on; Ctrl-C stops it", LONG_S)
+        session.press("p")
+        session.read_until("paused at theta_i ", LONG_S)
+        yield session
+
+
 def the_channel_of(run: Path) -> Path:
     wait_for((run / FILE_NAME).exists, "the record", LONG_S)
     folder = channel.channel_of(run / FILE_NAME)
@@ -91,12 +102,7 @@ def test_an_abort_in_a_pause_leaves_a_safe_rig_and_a_run_that_resumes(tmp_path: 
 
 def test_the_key_p_pauses_the_scan_and_lets_it_go_on(tmp_path: Path) -> None:
     run = tmp_path / "run"
-    with TerminalSession(
-        ("-m", "acquisition", "run", small_demo(tmp_path), "--out", run)
-    ) as session:
-        session.read_until("p pauses the scan and lets it go on; Ctrl-C stops it", LONG_S)
-        session.press("p")
-        session.read_until("paused at theta_i ", LONG_S)
+    with paused_at_a_terminal(run) as session:
         session.press("p")
         session.read_until("goes on after ", LONG_S)
         assert session.wait(LONG_S) == 0, session.text
@@ -110,12 +116,7 @@ def test_the_key_p_pauses_the_scan_and_lets_it_go_on(tmp_path: Path) -> None:
 
 def test_ctrl_c_in_a_pause_stops_the_scan_and_gives_the_terminal_back(tmp_path: Path) -> None:
     run = tmp_path / "run"
-    with TerminalSession(
-        ("-m", "acquisition", "run", small_demo(tmp_path), "--out", run)
-    ) as session:
-        session.read_until("p pauses the scan", LONG_S)
-        session.press("p")
-        session.read_until("paused at theta_i ", LONG_S)
+    with paused_at_a_terminal(run) as session:
         session.press("\x03")
         assert session.wait(LONG_S) == 4, session.text
         assert session.is_as_before

@@ -9,9 +9,8 @@ import sys
 import termios
 import time
 from collections.abc import Sequence
-from types import TracebackType
-from typing import Self
 
+from instrument.closeable import Closeable
 from tests.support.paths import ROOT
 from tests.support.timing.deadline import DEADLINE_S
 
@@ -22,7 +21,7 @@ _OWN_TERMINAL = (
 )
 
 
-class TerminalSession:
+class TerminalSession(Closeable):
     """Python with these arguments; `text`: all that it has written so far."""
 
     def __init__(self, arguments: Sequence[object]) -> None:
@@ -35,15 +34,8 @@ class TerminalSession:
         )  # fmt: skip
         self._slave = slave  # stays open, so that its settings can be read in the end
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Kill the command if it still runs, and close its terminal."""
         self._process.kill()
         self._process.wait(DEADLINE_S)
         os.close(self._terminal)
@@ -65,15 +57,19 @@ class TerminalSession:
             assert time.monotonic() < until_s, f"{text!r} has not come: {self.text!r}"
             self.look(0.1)
 
-    def look(self, seconds: float) -> None:
-        """Read what is written within this time, at most once."""
-        if select.select([self._terminal], [], [], seconds)[0]:
-            self.text += os.read(self._terminal, 65536).decode("utf-8", "replace")
+    def look(self, seconds: float) -> bool:
+        """Read what is written within this time, at most once; return False if nothing was."""
+        if not select.select([self._terminal], [], [], seconds)[0]:
+            return False
+        self.text += os.read(self._terminal, 65536).decode("utf-8", "replace")
+        return True
 
     def wait(self, deadline_s: float = DEADLINE_S) -> int:
-        """Return the exit code; what is written meanwhile is read."""
+        """Return the exit code; all that was written until then has been read."""
         until_s = time.monotonic() + deadline_s
         while self._process.poll() is None:
             assert time.monotonic() < until_s, f"it runs on: {self.text!r}"
             self.look(0.01)
+        while self.look(0.0):
+            pass
         return self._process.returncode

@@ -17,10 +17,11 @@ import time
 from collections import deque
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 
 import pytest
 from _pytest.runner import runtestprotocol
+
+from instrument.closeable import Closeable
 
 MARKS = ("waits", "real_time")
 TRIES = 4
@@ -33,7 +34,7 @@ _TICK_S, _LOOK_S = 0.01, 0.1  # of the own thread; between two looks at other pr
 _PROPERTY = "repeated"
 
 
-class Standstills:
+class Standstills(Closeable):
     """Delays of a thread that wakes every 10 ms, within a `with` block.
 
     longest_s: the longest. late_s: the largest sum of those within WITHIN_S. starved_s: the longest
@@ -46,17 +47,10 @@ class Standstills:
         self.looks: deque[dict[int, float]] = deque(maxlen=1 + round(WITHIN_S / _LOOK_S))
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._measure, daemon=True, name="standstills")
-
-    def __enter__(self) -> Standstills:
         self._thread.start()
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Measure no more; may be called twice."""
         self._done.set()
         self._thread.join()
 
