@@ -27,6 +27,7 @@ class WatchedRecord(Record):
     """Record whose `add_reading` counts as a device call, and whose disk can fail."""
 
     triggers = Triggers()
+    _is_full = False
 
     def add_reading(
         self,
@@ -36,6 +37,8 @@ class WatchedRecord(Record):
         files: Sequence[str] = (),
     ) -> None:
         with self.triggers.call("record.add_reading"):
+            if self._is_full:  # a small row may find room in a page that is there already
+                preview = Preview(reading.step, "larger than a page", bytes(2**16), [])
             super().add_reading(reading, preview, frames, files)
 
     def refuse_writes(self) -> None:
@@ -43,7 +46,8 @@ class WatchedRecord(Record):
         self._db.execute("PRAGMA query_only = ON")
 
     def fill_disk(self) -> None:
-        """Leave no free space."""
+        """Leave no room for the next reading."""
+        self._is_full = True
         (pages,) = self._db.execute("PRAGMA page_count").fetchone()
         self._db.execute(f"PRAGMA max_page_count = {pages}")
 

@@ -15,12 +15,13 @@ import pytest
 
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded
+from instrument.config.protocol import DriftCheck
 from instrument.errors import DeviceError, GonioError, OperatorStop, StorageError
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 from sim.faults.faults import FAULTS, Faults
 from sim.faults.triggers import When
-from tests.support.scans import small_scan, undated
+from tests.support.scans import changed, small_scan, undated
 from tests.support.whole_scans import faulty_scan
 from tests.support.whole_scans.faulty_scan import ScanResult, Trigger, require_reported
 
@@ -33,9 +34,20 @@ def scan(
     )
 
 
+BEFORE = 5  # readings before the step in which a fault occurs; that step is a drift check
+
+
 @pytest.fixture(scope="module")
 def small() -> Loaded:
-    return small_scan()
+    """Two views at each of two incidences, a drift check after each two points: nine steps."""
+    loaded = small_scan(shrink=10)
+    (sweep,), references = loaded.protocol.sweeps, loaded.protocol.references
+    often = DriftCheck(theta_r_deg=10.0, every_points=2)
+    return changed(
+        loaded,
+        sweeps=[{**sweep, "theta_r_deg": [-35.0, 35.0]}],
+        references=references.model_copy(update={"drift_check": often}),
+    )
 
 
 @dataclass(frozen=True)
@@ -57,9 +69,9 @@ def sound(small: Loaded, tmp_path_factory: pytest.TempPathFactory) -> SoundScan:
 
 
 def states(calls: list[str]) -> dict[str, Trigger]:
-    """A trigger in each state of the engine, the later ones at the eighth step of the scan."""
+    """A trigger in each state of the engine, the later ones at the sixth step of the scan."""
     accepted = [n for n, call in enumerate(calls) if call == "record.add_reading"]
-    grabs = (n for n, call in enumerate(calls) if call == "camera.grab" and n > accepted[6])
+    grabs = (n for n, call in enumerate(calls) if call == "camera.grab" and n > accepted[BEFORE - 1])
     first, rest = islice(grabs, 2)
     arrives = max(n for n, call in enumerate(calls[:first]) if call == "theta_r.wait")
     return {
@@ -69,7 +81,7 @@ def states(calls: list[str]) -> dict[str, Trigger]:
         "settling": trigger(calls, arrives, "after"),
         "exposing": trigger(calls, first),  # the frame that determines the exposure
         "reading": trigger(calls, rest),  # the other frames
-        "writing": trigger(calls, accepted[7]),  # while the stage moves on
+        "writing": trigger(calls, accepted[BEFORE]),  # while the stage moves on
     }
 
 
@@ -80,7 +92,7 @@ def trigger(calls: list[str], index: int, when: When = "at") -> Trigger:
 
 def readings_before(state: str) -> int:
     """Number of readings on disk when a fault occurs in that state."""
-    return 0 if state in ("idle", "homing") else 7
+    return 0 if state in ("idle", "homing") else BEFORE
 
 
 # Faults that end the scan: error class, and what the message says about device and cause.
@@ -248,7 +260,7 @@ def test_an_axis_pushed_while_it_should_stand_still(
 def test_a_shutter_that_stays_open_at_the_end_is_reported(
     small: Loaded, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    last = "after record.add_reading 16"
+    last = "after record.add_reading 9"
     result = scan(small, tmp_path / "run", Faults(f"lamp sticks {last}"))
     assert result.error is None
     assert "LOOK AT THE RIG FIRST: lamp could not be made safe" in capsys.readouterr().err
@@ -286,12 +298,12 @@ def test_faults_at_calls_all_over_a_scan(
 ) -> None:
     """No accepted reading is wrong, whatever fails and when, also in the resumed scan.
 
-    With --slow every eleventh of the 5642 pairs of fault and call: each fault at 19 or 20 calls.
+    With --slow every seventh of the 4368 pairs of fault and call: each fault at 24 calls.
     """
     every = [(device, fault) for device, words in FAULTS.items() for fault in words]
     cases = [(n, *one) for n in range(len(sound.calls)) for one in every]
     outcomes: Counter[str] = Counter()
-    for number, device, fault in cases[:: 11 if slow else 397]:
+    for number, device, fault in cases[:: 7 if slow else 293]:
         folder = tmp_path / f"{number} {device} {fault}"
         faults = Faults()
         faults.plan(device, fault, *trigger(sound.calls, number))
