@@ -30,6 +30,21 @@ def small_scan(rig: str = "bench_12bit", shrink: int = 5) -> Loaded:
     return changed(shrunk(demo, shrink), sweeps=[sweep], references=references)
 
 
+def shortest_scan() -> Loaded:
+    """`small_scan` with small pictures, two views at each incidence, a drift check after each two.
+
+    Nine steps: two of the tile, a drift check, and twice two points and a drift check.
+    """
+    loaded = small_scan(shrink=10)
+    (sweep,), references = loaded.protocol.sweeps, loaded.protocol.references
+    often = DriftCheck(theta_r_deg=10.0, every_points=2)
+    return changed(
+        loaded,
+        sweeps=[{**sweep, "theta_r_deg": [-35.0, 35.0]}],
+        references=references.model_copy(update={"drift_check": often}),
+    )
+
+
 def shrunk(loaded: Loaded, times: int) -> Loaded:
     """Copy of the configuration with 1/times of the camera's rows and columns."""
     camera = loaded.rig.camera

@@ -29,7 +29,7 @@ from acquisition.rig import open_devices
 from instrument.config.load import Loaded
 from instrument.errors import InputError
 from instrument.record.record import Record
-from tests.support.scans import changed, small_scan, undated
+from tests.support.scans import changed, shortest_scan, small_scan, undated
 
 
 @dataclass
@@ -78,7 +78,7 @@ class Killer:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._loaded = small_scan()
+        self._loaded = shortest_scan()
         self._plan = make_plan(self._loaded)
         scan(folder / "whole", self._loaded, self._plan, lambda _: None)  # fills the caches
         with Record.open(folder / "whole") as record:

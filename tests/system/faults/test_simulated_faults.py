@@ -15,13 +15,12 @@ import pytest
 
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded
-from instrument.config.protocol import DriftCheck
 from instrument.errors import DeviceError, GonioError, OperatorStop, StorageError
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 from sim.faults.faults import FAULTS, Faults
 from sim.faults.triggers import When
-from tests.support.scans import changed, small_scan, undated
+from tests.support.scans import shortest_scan, undated
 from tests.support.whole_scans import faulty_scan
 from tests.support.whole_scans.faulty_scan import ScanResult, Trigger, require_reported
 
@@ -39,15 +38,7 @@ BEFORE = 5  # readings before the step in which a fault occurs; that step is a d
 
 @pytest.fixture(scope="module")
 def small() -> Loaded:
-    """Two views at each of two incidences, a drift check after each two points: nine steps."""
-    loaded = small_scan(shrink=10)
-    (sweep,), references = loaded.protocol.sweeps, loaded.protocol.references
-    often = DriftCheck(theta_r_deg=10.0, every_points=2)
-    return changed(
-        loaded,
-        sweeps=[{**sweep, "theta_r_deg": [-35.0, 35.0]}],
-        references=references.model_copy(update={"drift_check": often}),
-    )
+    return shortest_scan()
 
 
 @dataclass(frozen=True)
@@ -71,8 +62,8 @@ def sound(small: Loaded, tmp_path_factory: pytest.TempPathFactory) -> SoundScan:
 def states(calls: list[str]) -> dict[str, Trigger]:
     """A trigger in each state of the engine, the later ones at the sixth step of the scan."""
     accepted = [n for n, call in enumerate(calls) if call == "record.add_reading"]
-    grabs = (n for n, call in enumerate(calls) if call == "camera.grab" and n > accepted[BEFORE - 1])
-    first, rest = islice(grabs, 2)
+    grabs = (n for n, call in enumerate(calls) if call == "camera.grab")
+    first, rest = islice((n for n in grabs if n > accepted[BEFORE - 1]), 2)
     arrives = max(n for n, call in enumerate(calls[:first]) if call == "theta_r.wait")
     return {
         "idle": trigger(calls, calls.index("theta_r.identity")),  # devices are identified
