@@ -146,8 +146,6 @@ class FrameScatter:
         The last readings give its 95 % bound, as two frames alone may agree by chance; it counts up
         to what the rig file allows.
         """
-        from scipy.special import chdtri
-
         last = self._without_worst()
         if not last:
             return 0.0
@@ -156,6 +154,8 @@ class FrameScatter:
         all_of_them = sum(one.noise_ratio for one in last) > chi_squared_limit(freedom, SEEN_SIGMA)
         if not (own or all_of_them):
             return 0.0
+        from scipy.special import chdtri  # heavy: no quiet scan needs it
+
         measured = found.squares / found.freedom - found.pixel_variance if own else 0.0
         shares = sum(one.squares / max(one.allowed_variance, 1e-12) for one in last)
         bound = min(shares / float(chdtri(freedom, 1 - _LOW_TAIL)), 1.0) * found.allowed_variance

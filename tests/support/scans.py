@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,9 @@ from instrument.config.rig import Rig
 from instrument.record.reading import Reading
 from sim.scene.scene import Scene
 from tests.support.paths import CONFIGS
+
+TWO_MODELS = "lambert, oren_nayar+torrance_sparrow"
+"""Candidates that are fitted in a tenth of a second; the demonstration's sample is the second."""
 
 
 def small_scan(rig: str = "bench_12bit", shrink: int = 5) -> Loaded:
@@ -64,12 +68,31 @@ def undated(readings: list[Reading]) -> list[Reading]:
     return [replace(r, time_utc="", free_s=0.0) for r in readings]
 
 
-def small_demo(folder: Path) -> Path:
-    """Write the demonstration protocol with two incidences and nine view angles into `folder`."""
+def small_rig(folder: Path, rig: str = "bench_12bit", shrink: int = 5) -> Path:
+    """Write a rig with 1/shrink of its camera's rows and columns into `folder`."""
+
+    def shrunken(found: re.Match[str]) -> str:
+        number = float(found[2]) / shrink
+        return f"{found[1]}{number if '.' in found[2] else int(number)}"
+
+    text = (CONFIGS / "rigs" / f"{rig}.yaml").read_text()
+    for name in ("width_px", "height_px", "axis_row_px", "axis_column_px"):
+        text = re.sub(rf"({name}: )([\d.]+)", shrunken, text)
+    path = folder / "small_rig.yaml"
+    path.write_text(text)
+    return path
+
+
+def small_demo(folder: Path, models: str = "") -> Path:
+    """Write the demonstration with two incidences, nine view angles and few pixels into `folder`.
+
+    models: the candidates of its fit, empty for the automatic choice.
+    """
     text = (CONFIGS / "protocols" / "demo.yaml").read_text()
     text = text.replace("[30.0, 45.0, 60.0]", "[30.0, 60.0]").replace("num: 33", "num: 9")
+    text = text.replace("../rigs/bench_12bit.yaml", str(small_rig(folder)))
     path = folder / "small.yaml"
-    path.write_text(text.replace("../rigs/", f"{CONFIGS / 'rigs'}/"))
+    path.write_text(text + (f"fit: {{models: [{models}]}}\n" if models else ""))
     return path
 
 

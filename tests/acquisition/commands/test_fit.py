@@ -13,12 +13,12 @@ import pytest
 
 from analysis.models import MODELS
 from instrument.geometry import Geometry
-from tests.support.command import gonio as gonio_process
 from tests.support.command import gonio_here as gonio
 from tests.support.paths import ROOT
 from tests.support.scans import small_demo
 
 CURET = ROOT.parent / "shared" / "data" / "curet"
+TWO = "lambert,oren_nayar"
 VIEWS = np.arange(-70.0, 71.0, 10.0)
 HEADER = "theta_i_deg,theta_r_deg,dphi_deg,brdf,u_brdf\n"
 
@@ -78,7 +78,7 @@ def test_a_narrow_terminal_cuts_no_number(rough: Path, monkeypatch: pytest.Monke
     def printed(columns: int) -> str:
         monkeypatch.setenv("COLUMNS", str(columns))
         models = "lambert,lambert+torrance_sparrow,oren_nayar"
-        return gonio_process("fit", rough, "--models", models).stdout
+        return gonio("fit", rough, "--models", models).stdout
 
     number = r"-?\d[\d.e+]*"
     wide, narrow = printed(200), printed(50)
@@ -206,39 +206,41 @@ def test_relative_values_give_the_roughness_and_no_albedo(rough: Path, tmp_path:
     assert found["per_brdf"]["u"] is None
 
 
+def dull_demo(folder: Path, model: str, fit: str) -> Path:
+    """The small demonstration without lobe: an early candidate explains it, so few are tried."""
+    protocol = small_demo(folder)
+    text = protocol.read_text().replace("oren_nayar+torrance_sparrow", model)
+    protocol.write_text(f"{text.replace(', ks: 0.076', '')}{fit}\n")
+    return protocol
+
+
 @pytest.mark.parametrize(
-    ("tile", "block"),
+    ("tile", "model", "block", "options"),
     [
-        (True, ""),
-        (True, "fit: {method: qualitative}"),
-        (True, "fit: {models: [lambert, wolff]}"),
-        (False, "fit: {models: [lambert, wolff]}"),
+        (True, "oren_nayar", "", ()),
+        (True, "oren_nayar_qualitative", "fit: {method: qualitative}", ("--method", "qualitative")),
+        (True, "oren_nayar", "fit: {models: [lambert, oren_nayar]}", ("--models", TWO)),
+        (False, "oren_nayar", "fit: {models: [lambert, oren_nayar]}", ("--models", TWO)),
     ],
 )
 def test_a_run_and_its_table_are_fitted_as_at_the_run_s_end(
-    tile: bool, block: str, tmp_path: Path
+    tile: bool, model: str, block: str, options: tuple[str, ...], tmp_path: Path
 ) -> None:
     """Fits of the folder follow the protocol's `fit:`; a table has the numbers alone."""
-    protocol = small_demo(tmp_path)
-    text = protocol.read_text() + block + "\n"
-    if "qualitative" in block:  # a sample that this method explains: else the whole ladder is tried
-        text = text.replace("oren_nayar+torrance_sparrow", "oren_nayar_qualitative")
-        text = text.replace(", ks: 0.076", "")
-    protocol.write_text(text if tile else re.sub(r"  white_tile:.*\n", "", text))
+    protocol = dull_demo(tmp_path, model, block)
+    if not tile:
+        protocol.write_text(re.sub(r"  white_tile:.*\n", "", protocol.read_text()))
     done = gonio("run", protocol, "--out", tmp_path / "run", "--json")
     at_end = json.loads(done.stdout)
     assert at_end["candidates"]
     again = gonio("fit", tmp_path / "run", "--json")
     assert json.loads(again.stdout) == at_end
-    options = {"": (), "fit: {method: qualitative}": ("--method", "qualitative")}
-    options = options.get(block, ("--models", "lambert,wolff"))
     table_alone = gonio("fit", tmp_path / "run" / "measurements.csv", *options, "--json")
     assert json.loads(table_alone.stdout) == at_end
 
 
 def test_options_go_before_the_fit_block_of_a_run(tmp_path: Path) -> None:
-    protocol = small_demo(tmp_path)
-    protocol.write_text(protocol.read_text() + "fit: {models: [lambert]}\n")
+    protocol = dull_demo(tmp_path, "oren_nayar_qualitative", "fit: {models: [lambert]}")
     gonio("run", protocol, "--out", tmp_path / "run", "--json")
     done = gonio("fit", tmp_path / "run", "--models", "wolff", "--json")
     assert json.loads(done.stdout)["chosen"] == "wolff"

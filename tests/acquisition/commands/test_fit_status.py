@@ -12,7 +12,7 @@ import pytest
 from acquisition.commands.fit_status import require_result
 from instrument.errors import AllFlagged, NotDetermined
 from tests.support.command import gonio_here as gonio
-from tests.support.scans import small_demo
+from tests.support.scans import TWO_MODELS, small_demo
 
 FILES = {"record.sqlite", "measurements.csv", "fit.json", "report.html"}
 COMPLETE = "the run is complete: all readings are recorded and reported"
@@ -34,14 +34,14 @@ class Case(NamedTuple):
 WITH_TILE = "  white_tile: {reflectance: 0.99, u_reflectance: 0.005, theta_r_deg: 10.0}\n"
 DRIFT_CHECK = "  drift_check: {theta_r_deg: 10.0, every_points: 25}\n"
 CASES = {
-    "adequate": Case({}, 0, "adequate", models="lambert,oren_nayar+torrance_sparrow"),
+    "adequate": Case({}, 0, "adequate", models=TWO_MODELS),
     "no candidate is adequate": Case({}, 0, "none adequate", models="lambert"),
     "no white tile": Case(
         {WITH_TILE: ""},
         5,
         "not identifiable",
         "do not determine albedo",
-        "lambert,oren_nayar+torrance_sparrow",
+        TWO_MODELS,
     ),
     "too few points": Case(
         {

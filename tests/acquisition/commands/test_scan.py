@@ -8,28 +8,25 @@ import os
 import re
 import shutil
 import signal
-import sqlite3
 import subprocess
-import sys
-import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from acquisition.commands import scan
+from instrument.record.reading import Reading
 from instrument.record.record import Record
-from tests.support.command import gonio as gonio_process
 from tests.support.command import gonio_here as gonio
-from tests.support.scans import small_demo
+from tests.support.scans import TWO_MODELS, small_demo
 
-DEADLINE_S = 300.0
 METADATA = "{sample_id: F-17, operator: Jürgen, wavelength_nm: 550, notes: 'two, \"three\"'}"
 
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A protocol of two incidences and nine view angles, with metadata."""
-    path = small_demo(tmp_path_factory.mktemp("protocol"))
+    path = small_demo(tmp_path_factory.mktemp("protocol"), TWO_MODELS)
     path.write_text(f"{path.read_text()}metadata: {METADATA}\n")
     return path
 
@@ -38,9 +35,9 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(
     small: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    """A run in a process of its own: its folder and its output."""
+    """The folder of a run, and its output."""
     folder = tmp_path_factory.mktemp("runs") / "run"
-    done = gonio_process("run", small, "--out", folder)
+    done = gonio("run", small, "--out", folder)
     assert done.returncode == 0, done.stderr
     return folder, done
 
@@ -52,10 +49,33 @@ def finished(run: tuple[Path, subprocess.CompletedProcess[str]]) -> Path:
 
 @pytest.fixture(scope="module")
 def stopped(small: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run stopped with Ctrl-C: copy it before changing it."""
+    """A run stopped with Ctrl-C after some readings: copy it before changing it."""
     folder = tmp_path_factory.mktemp("stopped") / "run"
-    _stop_after_some_readings(small, folder, signal.SIGINT)
+    add_reading = Record.add_reading
+
+    def stop_after_some(record: Record, reading: Reading, *more: Any, **named: Any) -> None:
+        add_reading(record, reading, *more, **named)
+        if reading.step == 5:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Record, "add_reading", stop_after_some)
+        done = gonio("run", small, "--out", folder)
+    assert done.returncode == 4, done.stderr
+    assert f"gonio resume {folder}" in done.stderr
+    assert not (folder / "record.sqlite-wal").exists()  # the record was closed in order
     return folder
+
+
+@pytest.fixture(scope="module")
+def relative(
+    small: Path, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, subprocess.CompletedProcess[str]]:
+    """A run without a white tile: its folder and its output."""
+    folder = tmp_path_factory.mktemp("relative")
+    protocol = folder / "relative.yaml"
+    protocol.write_text(re.sub(r"  white_tile:.*\n", "", small.read_text()))
+    return folder / "run", gonio("run", protocol, "--out", folder / "run")
 
 
 def rows(folder: Path) -> list[dict[str, str]]:
@@ -168,39 +188,6 @@ def test_a_stopped_scan_names_the_command_that_resumes_it(
         assert float(a["brdf"]) == pytest.approx(float(b["brdf"]), rel=2e-3)
 
 
-def _stop_after_some_readings(protocol: Path, folder: Path, stop: signal.Signals) -> None:
-    """Start a slow enough run, wait until readings are on disk, send the signal."""
-    text = protocol.read_text().replace("frames_per_point: 4", "frames_per_point: 60")
-    protocol = folder.with_suffix(".yaml")
-    protocol.write_text(text)
-    process = subprocess.Popen(
-        [sys.executable, "-m", "acquisition", "run", protocol, "--out", folder],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    deadline = time.monotonic() + DEADLINE_S
-    while _readings(folder) < 3:
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    process.send_signal(stop)
-    _, errors = process.communicate(timeout=DEADLINE_S)
-    assert process.returncode == 4, errors
-    assert f"gonio resume {folder}" in errors
-    assert "Traceback" not in errors
-    assert not (folder / "record.sqlite-wal").exists()  # the record was closed in order
-
-
-def _readings(folder: Path) -> int:
-    try:
-        database = sqlite3.connect(f"file:{folder / 'record.sqlite'}?mode=ro", uri=True)
-        try:
-            return int(database.execute("SELECT COUNT(*) FROM reading").fetchone()[0])
-        finally:
-            database.close()
-    except sqlite3.OperationalError:
-        return 0
-
-
 def test_resume_needs_permission_to_move(stopped: Path) -> None:
     done = gonio("resume", stopped)
     assert done.returncode == 2
@@ -233,38 +220,34 @@ def test_a_folder_without_a_run_is_named(command: str, tmp_path: Path) -> None:
     assert f"{tmp_path}: no record.sqlite there" in done.stderr
 
 
-def test_without_a_white_tile_only_the_shape_is_determined(small: Path, tmp_path: Path) -> None:
-    text = re.sub(r"  white_tile:.*\n", "", small.read_text())
-    protocol = tmp_path / "relative.yaml"
-    protocol.write_text(text)
-    done = gonio("run", protocol, "--out", tmp_path / "run")
+def test_without_a_white_tile_only_the_shape_is_determined(
+    relative: tuple[Path, subprocess.CompletedProcess[str]],
+) -> None:
+    folder, done = relative
     assert done.returncode == 5, done.stderr
     assert "do not determine albedo" in " ".join(done.stdout.split())
-    assert all(row["brdf"] == "" and float(row["radiance"]) > 0 for row in rows(tmp_path / "run"))
-    fit = json.loads((tmp_path / "run" / "fit.json").read_text())
+    assert all(row["brdf"] == "" and float(row["radiance"]) > 0 for row in rows(folder))
+    fit = json.loads((folder / "fit.json").read_text())
     assert fit["verdict"] == "not identifiable"
     found = next(c for c in fit["candidates"] if c["model"] == fit["chosen"])["parameters"]
     assert found["albedo"]["u"] is None
     assert abs(found["sigma_deg"]["value"] - 20) < 4 * found["sigma_deg"]["u"]
-    report = (tmp_path / "run" / "report.html").read_text()
-    assert "radiance is relative" in report
+    assert "radiance is relative" in (folder / "report.html").read_text()
 
 
 def test_without_a_white_tile_the_strength_of_the_lobe_is_known_beside_the_diffuse_part(
-    small: Path, tmp_path: Path
+    relative: tuple[Path, subprocess.CompletedProcess[str]],
 ) -> None:
     """ks/albedo with u in fit.json, in the printed table and in the report; k_s/k_d explained."""
-    text = re.sub(r"  white_tile:.*\n", "", small.read_text())
-    protocol = tmp_path / "relative.yaml"
-    protocol.write_text(text + "fit: {models: [oren_nayar+torrance_sparrow]}\n")
-    done = gonio("run", protocol, "--out", tmp_path / "run")
-    (candidate,) = json.loads((tmp_path / "run" / "fit.json").read_text())["candidates"]
-    ratio = candidate["ratios"]["ks/albedo"]
+    folder, done = relative
+    fit = json.loads((folder / "fit.json").read_text())
+    (glossy,) = (c for c in fit["candidates"] if c["model"] == "oren_nayar+torrance_sparrow")
+    ratio = glossy["ratios"]["ks/albedo"]
     assert abs(ratio["value"] - 0.076 / 0.80) < 4 * ratio["u"] < 0.02
     words = "k_s/k_d as in Oren and Nayar (1995), whose lobe (37) leaves out the factor 1/4"
     printed = " ".join(done.stdout.split())
-    fitted = " ".join(gonio("fit", tmp_path / "run").stdout.split())
-    for shown in (printed, fitted, (tmp_path / "run" / "report.html").read_text()):
+    fitted = " ".join(gonio("fit", folder).stdout.split())
+    for shown in (printed, fitted, (folder / "report.html").read_text()):
         assert "ks/albedo" in shown
         assert words in shown
 
@@ -337,7 +320,7 @@ def test_a_resume_says_how_the_scan_ended_also_where_no_word_of_it_was_left(
 
 def test_a_protocol_and_a_run_whose_names_are_no_utf_8(tmp_path: Path) -> None:
     protocol = tmp_path / os.fsdecode(b"pr\xff.yaml")
-    small_demo(tmp_path).rename(protocol)
+    small_demo(tmp_path, TWO_MODELS).rename(protocol)
     run = tmp_path / os.fsdecode(b"run\xfe")
     done = gonio("run", protocol, "--out", run)
     assert done.returncode == 0, done.stderr

@@ -13,22 +13,17 @@ from instrument.config.load import Loaded, load_protocol
 from instrument.record.event_kinds import FINISHED
 from instrument.record.record import Record
 from tests.support.paths import CONFIGS
+from tests.support.scans import small_rig
 from tests.support.whole_scans.stopped_scan import scan
-
-_SHRINK = 5
 
 
 def live_protocol(
     folder: Path, *, rig: str = "bench_12bit", tile: bool = True, keep_frames: bool = False
 ) -> Loaded:
     """Two incidences of five views on a rig, with 1/5 of its camera's rows and columns."""
-    rig_text = (CONFIGS / "rigs" / f"{rig}.yaml").read_text()
-    for name in ("width_px", "height_px", "axis_row_px", "axis_column_px"):
-        rig_text = re.sub(rf"({name}: )([\d.]+)", _shrunk, rig_text)
-    (folder / "small_rig.yaml").write_text(rig_text)
     text = (CONFIGS / "protocols" / "demo.yaml").read_text()
     text = text.replace("[30.0, 45.0, 60.0]", "[30.0, 60.0]").replace("num: 33", "num: 5")
-    text = text.replace("../rigs/bench_12bit.yaml", "small_rig.yaml")
+    text = text.replace("../rigs/bench_12bit.yaml", small_rig(folder, rig).name)
     text = text.replace("every_points: 25", "every_points: 4")
     if not tile:
         text = re.sub(r"  white_tile: .*\n", "", text)
@@ -38,11 +33,6 @@ def live_protocol(
     text += "fit: {models: [lambert, oren_nayar]}\n"
     (folder / "small.yaml").write_text(text)
     return load_protocol(folder / "small.yaml")
-
-
-def _shrunk(found: re.Match[str]) -> str:
-    number = float(found[2]) / _SHRINK
-    return f"{found[1]}{number if '.' in found[2] else int(number)}"
 
 
 @contextmanager
