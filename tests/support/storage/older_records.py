@@ -19,6 +19,7 @@ def as_version(run: Path, version: int) -> None:
     with closing(sqlite3.connect(new, isolation_level=None)) as database:
         database.executescript(OLDER_SQL[version])
         database.execute("ATTACH ? AS new", (str(old),))
+        database.execute("BEGIN")  # else each row is a transaction of its own
         for table, columns in tables_of(version).items():
             names = ", ".join(column.name for column in columns)
             if has_seals(version):
@@ -26,6 +27,7 @@ def as_version(run: Path, version: int) -> None:
             else:
                 database.execute(f"INSERT INTO main.{table} SELECT {names} FROM new.{table}")
         _name_version(database, version)
+        database.execute("COMMIT")
     for name in ("new.sqlite", "new.sqlite-wal", "new.sqlite-shm"):
         (run / name).unlink(missing_ok=True)
 

@@ -14,6 +14,7 @@ from instrument.record.record import FILE_NAME
 from instrument.record.schema import SCHEMA_VERSION
 from tests.support.command import gonio_here as gonio
 from tests.support.paths import CONFIGS
+from tests.support.scans import small_rig
 from tests.support.storage.older_records import as_version, seal_again
 
 SCRIPT = "<script>alert(1)</script>"
@@ -72,10 +73,12 @@ def _write_schema(database: sqlite3.Connection, texts: list[tuple[str, str]]) ->
 
 
 def run_few_points(folder: Path) -> Path:
-    """Run the demo with few view angles and models; returns the run's folder, in `folder`."""
+    """Run the demo, matt, with few angles, pixels and models; return its folder, in `folder`."""
     text = (CONFIGS / "protocols" / "demo.yaml").read_text().replace("num: 33", "num: 5")
     protocol = folder / "few.yaml"
-    text = text.replace("../rigs/", f"{CONFIGS / 'rigs'}/")
+    text = text.replace("[30.0, 45.0, 60.0]", "[30.0, 60.0]")
+    text = text.replace("../rigs/bench_12bit.yaml", str(small_rig(folder)))
+    text = text.replace("oren_nayar+torrance_sparrow", "oren_nayar").replace(", ks: 0.076", "")
     protocol.write_text(f"{text}fit: {{models: [lambert, oren_nayar]}}\n")
     done = gonio("run", protocol, "--out", folder / "run")
     assert done.returncode == 0, done.stderr
@@ -84,12 +87,21 @@ def run_few_points(folder: Path) -> Path:
 
 def copy_of(run: Path, to: Path, version: int = SCHEMA_VERSION) -> Sent:
     """Copy a run into a folder of `to`, its record in that schema version."""
-    shutil.copytree(run, to / "sent")
+    shutil.copytree(_in_version(run, version), to / "sent")
     victim = to / "mine.txt"
     victim.write_text("my own\n")
-    if version != SCHEMA_VERSION:
-        as_version(to / "sent", version)
     return Sent(to / "sent", victim)
+
+
+def _in_version(run: Path, version: int) -> Path:
+    """Return the run, or a copy beside it in an older schema version, made once."""
+    if version == SCHEMA_VERSION:
+        return run
+    older = run.with_name(f"{run.name} version {version}")
+    if not older.exists():
+        shutil.copytree(run, older)
+        as_version(older, version)
+    return older
 
 
 def _view(sent: Sent) -> None:
