@@ -7,8 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from instrument.config.load import Loaded, load_protocol
 from instrument.config.protocol import DriftCheck, References, WhiteTile
 from instrument.config.rig import Rig
@@ -63,18 +61,6 @@ def shrunk(loaded: Loaded, times: int) -> Loaded:
         }
     )
     return changed(loaded, rig={"camera": small})
-
-
-def small_rig(folder: Path) -> Path:
-    """Write bench_12bit.yaml, with a quarter of the camera's rows and columns, into `folder`."""
-    rig = yaml.safe_load((CONFIGS / "rigs" / "bench_12bit.yaml").read_text())
-    for key in ("width_px", "height_px"):
-        rig["camera"][key] //= 4
-    for key in ("axis_row_px", "axis_column_px"):
-        rig["camera"][key] /= 4
-    path = folder / "small_rig.yaml"
-    path.write_text(yaml.safe_dump(rig))
-    return path
 
 
 def undated(readings: list[Reading]) -> list[Reading]:
