@@ -8,17 +8,19 @@ import re
 import shutil
 import signal
 import sqlite3
-import subprocess
-import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import yaml
 
+from sim.emulated.bench import CAMERA_DEVICE
+from sim.emulated.v4l2.shim import compile_shim, shim_environment
 from tests.support.command import gonio, gonio_here
-from tests.support.paths import CONFIGS, ROOT
-from tests.support.scans import small_demo
+from tests.support.paths import CONFIGS
+from tests.support.ready.ready_process import ReadyProcess
+from tests.support.scans import TWO_MODELS, small_demo
 from tests.support.whole_scans.simulated_rig import assert_same_within_noise, points, simulated
 
 pytestmark = [
@@ -27,20 +29,30 @@ pytestmark = [
         shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"
     ),
 ]
+QUICK = ("homing_s: 2.0", "homing_s: 0.2")  # in tests of something else than homing
 RIG = CONFIGS / "rigs" / "emulated.yaml"
 TRUTH = {"albedo": 0.80, "sigma_deg": 20.0, "ks": 0.076}
 
 
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The demonstration with two incidences and nine view angles."""
-    return small_demo(tmp_path_factory.mktemp("protocol"))
+    """The demonstration with two incidences, nine view angles and two models."""
+    return small_demo(tmp_path_factory.mktemp("protocol"), TWO_MODELS)
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory, protocol: Path) -> Path:
+def command(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ReadyProcess]:
+    """The command as it is once it has restarted with the emulated camera's library."""
+    folder = tmp_path_factory.mktemp("camera")
+    environment = shim_environment(compile_shim(folder), CAMERA_DEVICE, folder / "socket")
+    with ReadyProcess(environment=environment) as ready:
+        yield ready
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory, protocol: Path, command: ReadyProcess) -> Path:
     folder = tmp_path_factory.mktemp("emulated") / "run"
-    done = gonio("run", protocol, "--rig", RIG, "--out", folder)
+    done = command.run("run", protocol, "--rig", RIG, "--out", folder)
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -82,35 +94,31 @@ def test_the_record_holds_the_devices_identities_and_the_frames_times(run: Path)
 
 
 def test_an_exposure_that_the_camera_does_not_make_ends_the_scan(
-    tmp_path: Path, protocol: Path
+    tmp_path: Path, protocol: Path, command: ReadyProcess
 ) -> None:
     """The control takes and reads back any exposure; the sensor makes 0.5 ms at most."""
     rig = tmp_path / "rig.yaml"
     rig.write_text(
-        RIG.read_text().replace("homing_s: 2.0", "homing_s: 0.2")
-        + "  camera_defects: {longest_exposure_s: 0.0005}\n"
+        RIG.read_text().replace(*QUICK) + "  camera_defects: {longest_exposure_s: 0.0005}\n"
     )
-    done = gonio("run", protocol, "--rig", rig, "--out", tmp_path / "run")
+    done = command.run("run", protocol, "--rig", rig, "--out", tmp_path / "run")
     assert done.returncode == 3
     assert re.search("camera: (counts at|its frames come every)", done.stderr), done.stderr
     assert done.stderr.rstrip().endswith("Correct the rig file, then start a new run")
 
 
-def test_a_stopped_scan_is_resumed_where_it_ended(tmp_path: Path, protocol: Path) -> None:
+def test_a_stopped_scan_is_resumed_where_it_ended(
+    tmp_path: Path, protocol: Path, command: ReadyProcess
+) -> None:
     folder, rig = tmp_path / "run", tmp_path / "rig.yaml"
-    rig.write_text(
-        RIG.read_text().replace("homing_s: 2.0", "homing_s: 0.2")
-    )  # homed twice in this test
-    command = [sys.executable, "-m", "acquisition", "run", str(protocol),
-               "--rig", str(rig), "--out", str(folder)]  # fmt: skip
-    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL,
-                          stdout=subprocess.DEVNULL, text=True) as scanning:  # fmt: skip
-        wait_for_readings(folder, 5)
-        scanning.send_signal(signal.SIGTERM)
-        _, stderr = scanning.communicate(timeout=60)
-    assert scanning.returncode == 4
-    assert f"gonio resume {folder}" in stderr
-    done = gonio("resume", folder, "--yes", "--json")
+    rig.write_text(RIG.read_text().replace(*QUICK))
+    process = command.start("run", protocol, "--rig", rig, "--out", folder)
+    wait_for_readings(folder, 5)
+    os.kill(process, signal.SIGTERM)
+    stopped = command.finish()
+    assert stopped.returncode == 4
+    assert f"gonio resume {folder}" in stopped.stderr
+    done = command.run("resume", folder, "--yes", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["verdict"] == "adequate"
     assert len(points(folder)) == 17  # in the eighteenth, camera and lamp obstruct each other
@@ -129,14 +137,15 @@ def wait_for_readings(folder: Path, count: int) -> None:
     raise AssertionError(f"fewer than {count} readings after 60 s")
 
 
-def test_devices_lists_the_identity_of_every_device() -> None:
-    done = gonio("devices", "--rig", RIG)
+def test_devices_lists_the_identity_of_every_device(command: ReadyProcess) -> None:
+    done = command.run("devices", "--rig", RIG)
     assert done.returncode == 0, done.stderr
     for word in ("SMC100", "Oriental Motor AZ", "Zaber device", "Y16 320 x 256 pixels"):
         assert word in done.stdout
 
 
 def test_grab_takes_a_frame_with_the_emulated_camera(tmp_path: Path) -> None:
+    """As an operator starts it: the program restarts with the camera's library."""
     done = gonio(
         "grab", "--rig", RIG, "-o", tmp_path / "aim.png", "--exposure-s", "0.001", "--json"
     )
@@ -146,7 +155,7 @@ def test_grab_takes_a_frame_with_the_emulated_camera(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("luma_range", ["full", "limited"])
 def test_white_of_a_limited_range_is_saturated_or_the_camera_refused(
-    tmp_path: Path, luma_range: str
+    tmp_path: Path, luma_range: str, command: ReadyProcess
 ) -> None:
     rig = yaml.safe_load(RIG.read_text())
     rig["camera"] |= {
@@ -156,7 +165,8 @@ def test_white_of_a_limited_range_is_saturated_or_the_camera_refused(
     rig["simulation"]["camera_defects"] = {"limited_range": "declared"}
     path = tmp_path / "rig.yaml"
     path.write_text(yaml.safe_dump(rig))
-    done = gonio("grab", "--rig", path, "-o", tmp_path / "aim.png", "--exposure-s", "0.1", "--json")
+    to = tmp_path / "aim.png"
+    done = command.run("grab", "--rig", path, "-o", to, "--exposure-s", "0.1", "--json")
     if luma_range == "full":
         assert done.returncode == 3
         assert "its YUYV has limited range: black is 16 and white 235" in done.stderr
@@ -168,18 +178,17 @@ def test_white_of_a_limited_range_is_saturated_or_the_camera_refused(
 
 
 def test_move_homes_and_moves_an_emulated_axis() -> None:
-    done = gonio("move", "dphi", "30", "--rig", RIG)
+    done = gonio_here("move", "dphi", "30", "--rig", RIG)
     assert done.returncode == 0, done.stderr
     assert float(done.stdout.split()[-2]) == pytest.approx(30.0, abs=0.01)
 
 
-def test_a_missing_compiler_is_reported_before_the_run_folder_is_made(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "acquisition", "run", "configs/protocols/demo.yaml", "--rig",
-         str(RIG), "--out", str(tmp_path / "run")],
-        cwd=ROOT, capture_output=True, text=True, timeout=60, check=False,
-        env={**os.environ, "PATH": "/nowhere"},
-    )  # fmt: skip
+def test_a_missing_compiler_is_reported_before_the_run_folder_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", "/nowhere")
+    protocol = CONFIGS / "protocols" / "demo.yaml"
+    done = gonio_here("run", protocol, "--rig", RIG, "--out", tmp_path / "run")
     assert done.returncode == 3
     assert "no C compiler" in done.stderr
     assert not (tmp_path / "run").exists()

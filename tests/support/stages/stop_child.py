@@ -1,8 +1,8 @@
 """Scan in a process of its own that is stopped in the middle of a move, for `test_stop`.
 
-`python -m tests.support.stages.stop_child STAGE CAUSE ...`: SIGINT, SIGTERM, or `exception` in the
-scan itself, one scan for each cause. Prints the error's type, then the seconds from the cause to
-the arrival of the stop on the wire, and whether the motor still moves.
+Arguments: STAGE CAUSE ..., a cause being SIGINT, SIGTERM, or `exception` in the scan itself, with
+one scan for each. Prints the error's type, then the seconds from the cause to the arrival of the
+stop on the wire, and whether the motor still moves.
 """
 
 from __future__ import annotations
@@ -24,17 +24,21 @@ from acquisition.terminal import stop_signals
 from acquisition.terminal.orderly_end import orderly_end
 from acquisition.terminal.stop_thread import stopped_by_signals
 from instrument.clock import SystemClock
-from instrument.config.load import load_protocol
 from instrument.errors import DeviceError
 from instrument.record.record import Record
-from tests.support.paths import CONFIGS
-from tests.support.scans import changed
+from tests.support.scans import changed, small_scan
 from tests.support.stages.emulated_stages import EMULATED_STAGES, SLOW, EmulatedStage
 
 DEADLINE_S = 10.0
 
 
-def main(name: str, how: str) -> None:
+def main() -> None:
+    name, *causes = sys.argv[1:]
+    for cause in causes:
+        _stop(name, cause)
+
+
+def _stop(name: str, how: str) -> None:
     stop_signals.begin()  # again for each scan: an earlier stop belonged to another command
     with EMULATED_STAGES[name](SLOW) as emulated, TemporaryDirectory() as folder:
         moment: list[float] = []
@@ -71,7 +75,7 @@ def _interrupt(emulated: EmulatedStage, how: str, moment: list[float]) -> None:
 
 def _scan(emulated: EmulatedStage, how: str, moment: list[float], folder: Path) -> None:
     sweep = {"theta_i_deg": [60.0], "dphi_deg": [0.0], "theta_r_deg": [-70.0, 0.0]}
-    loaded = changed(load_protocol(CONFIGS / "protocols" / "demo.yaml"), sweeps=[sweep])
+    loaded = changed(small_scan(shrink=10), sweeps=[sweep])
     devices = open_devices(loaded)
     stage = emulated.stage
     if how == "exception":
@@ -97,8 +101,3 @@ class _Failing:
 
     def __getattr__(self, name: str) -> object:
         return getattr(self._stage, name)
-
-
-if __name__ == "__main__":
-    for each in sys.argv[2:]:
-        main(sys.argv[1], each)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.command import gonio_here
-from tests.support.scans import small_demo
+from tests.support.scans import TWO_MODELS, small_demo
 from tests.support.whole_scans.struck_command import struck
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP)
@@ -22,7 +22,7 @@ COMPUTING_S = {"help": 0.12, "models": 0.5, "fit": 1.2, "report": 2.0, "run": 2.
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("finished")
-    done = gonio_here("run", small_demo(folder), "--out", folder / "run")
+    done = gonio_here("run", small_demo(folder, TWO_MODELS), "--out", folder / "run")
     assert done.returncode == 0, done.stderr
     return folder
 

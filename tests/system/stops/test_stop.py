@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
+from collections.abc import Iterator
 
 import pytest
 
-from tests.support.paths import ROOT
+from tests.support.ready.ready_process import ReadyProcess
 from tests.support.stages.emulated_stages import EMULATED_STAGES
 from tests.support.stages.kinds import KINDS
 
@@ -18,12 +17,15 @@ BOUND_S = {name: 0.1 if kind.full_duplex else 0.3 for name, kind in KINDS.items(
 CAUSES = {"SIGINT": "KeyboardInterrupt", "SIGTERM": "KeyboardInterrupt", "exception": "DeviceError"}
 
 
+@pytest.fixture(scope="module")
+def child() -> Iterator[ReadyProcess]:
+    with ReadyProcess("tests.support.stages.stop_child:main", ()) as ready:
+        yield ready
+
+
 @pytest.mark.parametrize("emulated", list(EMULATED_STAGES))
-def test_a_stop_is_on_the_wire_in_time(emulated: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.support.stages.stop_child", emulated, *CAUSES],
-        capture_output=True, text=True, timeout=60, check=False, cwd=ROOT,
-    )  # fmt: skip
+def test_a_stop_is_on_the_wire_in_time(emulated: str, child: ReadyProcess) -> None:
+    done = child.run(emulated, *CAUSES)
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[::2] == list(CAUSES.values())

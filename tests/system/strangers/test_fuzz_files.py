@@ -22,7 +22,7 @@ from instrument.errors import InputError
 from instrument.text.terminal_safe import first_unfit
 from tests.support.analysis.csv_texts import BARE, PLAIN
 from tests.support.analysis.curet_texts import TABLE, VALUES
-from tests.support.command import gonio
+from tests.support.command import gonio_here as gonio
 from tests.support.config.texts import PROTOCOL, RIG, check_model
 from tests.support.paths import CONFIGS
 from tests.support.strangers.mutations import Mutator, feed

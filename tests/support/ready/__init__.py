@@ -1,0 +1,1 @@
+"""Processes that have imported all they need and fork for each call; see `ready_process`."""
