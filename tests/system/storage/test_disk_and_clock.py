@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import csv
 import logging
-import os
 import shutil
-import subprocess
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -27,11 +24,11 @@ from instrument.record import write_lock
 from instrument.record.reading import Reading
 from instrument.record.record import FILE_NAME, Record
 from tests.support.command import gonio_here as gonio
-from tests.support.paths import CONFIGS, ROOT
-from tests.support.scans import small_scan, undated
+from tests.support.ready.ready_process import ReadyProcess
+from tests.support.scans import shortest_scan, small_demo, undated
 from tests.support.storage.holder import Holder, held
 
-LOADED = small_scan()
+LOADED = shortest_scan()
 PLAN = make_plan(LOADED)
 
 
@@ -64,14 +61,14 @@ def test_a_run_folder_that_is_moved_ends_the_scan_with_its_new_name(
     whole: list[Reading], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     old, new = tmp_path / "run", tmp_path / "elsewhere"
-    at_step(monkeypatch, 7, lambda _: old.rename(new) and None)
+    at_step(monkeypatch, 5, lambda _: old.rename(new) and None)
     with Record.create(old, {}) as record:
         with pytest.raises(StorageError) as failed:
             scan(LOADED, PLAN, record)
         accepted = len(record.readings())
     assert "was moved while the scan ran: nothing accepted is lost" in str(failed.value)
     assert f"gonio resume {new}" in str(failed.value)
-    assert accepted == 6  # the point before waited to be written
+    assert accepted == 4  # the point before waited to be written
     monkeypatch.undo()
     with Record.open(new) as record:
         scan(LOADED, PLAN, record, Progress(tuple(record.readings())))
@@ -81,7 +78,7 @@ def test_a_run_folder_that_is_moved_ends_the_scan_with_its_new_name(
 def test_a_removed_run_folder_is_reported_as_lost(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    at_step(monkeypatch, 8, lambda _: shutil.rmtree(tmp_path / "run"))
+    at_step(monkeypatch, 5, lambda _: shutil.rmtree(tmp_path / "run"))
     with (
         Record.create(tmp_path / "run", {}) as record,
         pytest.raises(StorageError, match="was removed while the scan ran, and the") as failed,
@@ -152,15 +149,19 @@ def test_a_record_that_another_program_holds_is_waited_for_and_named(
 
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The demo with a coarse sweep, one model and kept frames."""
-    folder = tmp_path_factory.mktemp("protocol")
-    text = (CONFIGS / "protocols" / "demo.yaml").read_text()
-    text = text.replace("num: 33", "num: 5").replace("frames_per_point: 4", "frames_per_point: 2")
-    text = text.replace("[30.0, 45.0, 60.0]", "[30.0, 60.0]")
-    text = text.replace("../rigs", str(CONFIGS / "rigs"))
-    text += "keep_frames: true\nfit: {models: [oren_nayar]}\n"
-    (folder / "small.yaml").write_text(text)
-    return folder / "small.yaml"
+    """The small demonstration with fewer angles, the sample's model and kept frames."""
+    path = small_demo(tmp_path_factory.mktemp("protocol"), "oren_nayar+torrance_sparrow")
+    text = path.read_text().replace("num: 9", "num: 5")
+    text = text.replace("frames_per_point: 4", "frames_per_point: 2")
+    path.write_text(f"{text}keep_frames: true\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def disk(recorder: dict[str, str]) -> Iterator[ReadyProcess]:
+    """The command on a disk that may be in trouble: see `write_recorder.c`."""
+    with ReadyProcess(environment=recorder) as ready:
+        yield ready
 
 
 @pytest.fixture(scope="module")
@@ -180,29 +181,18 @@ def table(run: Path) -> list[list[str]]:
     return [row[:dated] + row[dated + 1 :] for row in rows]
 
 
-def on_a_disk(
-    recorder: dict[str, str], root: Path, trouble: dict[str, str], *arguments: object
-) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "acquisition", *map(str, arguments)],
-        env={**os.environ, **recorder, "GONIO_RECORD_ROOT": str(root), **trouble},
-        cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
-        stdin=subprocess.DEVNULL,
-    )  # fmt: skip
-
-
-# Bytes written: into a frame, into the record, and before there is a record at all.
-@pytest.mark.parametrize("quota", [9_000_000, 2_500_000])
+# Bytes written: the next belong to a frame, or to the record.
+@pytest.mark.parametrize("quota", [1_000_000, 750_000])
 def test_a_full_disk_ends_the_scan_which_resumes_with_more_room(
     quota: int,
     protocol: Path,
     finished: list[list[str]],
-    recorder: dict[str, str],
+    disk: ReadyProcess,
     tmp_path: Path,
 ) -> None:
     run = tmp_path / "disk" / "run"
-    trouble = {"GONIO_RECORD_QUOTA": str(quota)}
-    done = on_a_disk(recorder, tmp_path / "disk", trouble, "run", protocol, "--out", run)
+    trouble = {"GONIO_RECORD_ROOT": str(run.parent), "GONIO_RECORD_QUOTA": str(quota)}
+    done = disk.run("run", protocol, "--out", run, **trouble)
     assert done.returncode == 3, done.stderr
     assert "the disk is full" in done.stderr
     assert "make room on it" in done.stderr
@@ -218,28 +208,28 @@ def test_a_full_disk_ends_the_scan_which_resumes_with_more_room(
 
 
 def test_a_disk_that_is_full_at_the_start_leaves_no_folder(
-    protocol: Path, recorder: dict[str, str], tmp_path: Path
+    protocol: Path, disk: ReadyProcess, tmp_path: Path
 ) -> None:
     run = tmp_path / "disk" / "run"
-    trouble = {"GONIO_RECORD_QUOTA": "20000"}
-    done = on_a_disk(recorder, tmp_path / "disk", trouble, "run", protocol, "--out", run)
+    trouble = {"GONIO_RECORD_ROOT": str(run.parent), "GONIO_RECORD_QUOTA": "20000"}
+    done = disk.run("run", protocol, "--out", run, **trouble)
     assert done.returncode == 2, done.stderr
     assert f"{run}: no run can be written there: the disk is full" in done.stderr
     assert not run.exists()
 
 
 def test_a_read_only_folder_is_named_and_left_unchanged(
-    protocol: Path, recorder: dict[str, str], tmp_path: Path
+    protocol: Path, disk: ReadyProcess, tmp_path: Path
 ) -> None:
-    disk = tmp_path / "disk"
-    with Record.create(disk / "run", {}):
+    folder = tmp_path / "disk"
+    with Record.create(folder / "run", {}):
         pass
-    trouble = {"GONIO_RECORD_READ_ONLY": "1"}
-    done = on_a_disk(recorder, disk, trouble, "run", protocol, "--out", disk / "new")
+    trouble = {"GONIO_RECORD_ROOT": str(folder), "GONIO_RECORD_READ_ONLY": "1"}
+    done = disk.run("run", protocol, "--out", folder / "new", **trouble)
     assert done.returncode == 2, done.stderr
     assert "look at the folder's permissions" in done.stderr
     for command in ("resume", "report"):
-        done = on_a_disk(recorder, disk, trouble, command, disk / "run")
+        done = disk.run(command, folder / "run", **trouble)
         assert done.returncode == 3, done.stderr
         assert "cannot be written" in done.stderr
         assert "look at the folder's permissions" in done.stderr
