@@ -11,29 +11,22 @@ from pathlib import Path
 import pytest
 
 from acquisition.results.finish import finish
-from instrument.config.load import Loaded
 from instrument.errors import StorageError
 from instrument.record.record import Record
 from sim.faults.faults import VARIABLE
 from tests.support.command import gonio_here as gonio
-from tests.support.scans import small_scan
+from tests.support.scans import small_demo
 
 RESULTS = ("measurements.csv", "fit.json", "report.html")
 
 
 @pytest.fixture(scope="module")
-def small() -> Loaded:
-    return small_scan()
-
-
-@pytest.fixture(scope="module")
-def complete(small: Loaded, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def complete(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a complete run with few points and one model to fit."""
     folder = tmp_path_factory.mktemp("complete")
-    text = (Path(small.protocol_path).read_text()).replace("num: 33", "num: 5")
-    text = text.replace("../rigs/", f"{small.protocol_path.parent.parent / 'rigs'}/")
-    (folder / "foam.yaml").write_text(text + "\nfit: {models: [oren_nayar]}\n")
-    done = gonio("run", folder / "foam.yaml", "--out", folder / "run")
+    path = small_demo(folder, "oren_nayar+torrance_sparrow")
+    path.write_text(path.read_text().replace("num: 9", "num: 5"))
+    done = gonio("run", path, "--out", folder / "run")
     assert done.returncode == 0, done.stderr
     return folder / "run"
 
@@ -92,7 +85,7 @@ def test_a_folder_in_place_of_fit_json_is_reported(complete: Path) -> None:
 def test_a_fault_from_the_environment_stops_the_scan_and_resume_completes_it(
     complete: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    protocol, folder = complete.parent / "foam.yaml", tmp_path / "run"
+    protocol, folder = complete.parent / "small.yaml", tmp_path / "run"
     monkeypatch.setenv(VARIABLE, "theta_r stalls at theta_r.wait 5")
     done = gonio("run", protocol, "--out", folder)
     assert done.returncode == 3
