@@ -26,10 +26,12 @@ SAMPLES = {
 CASES = [("ggx", 0.3), *((kind, a) for kind in ("matt", "gloss") for a in (0.03, 0.3, 0.9))]
 
 
-def _deviations(rig: str, kind: str, albedo: float, draws: int, folder: Path) -> list[Deviations]:
+def _deviations(
+    rig: str, kind: str, albedo: float, draws: int, shrink: int, folder: Path
+) -> list[Deviations]:
     model, values = SAMPLES[kind]
     sample = SimulatedSample(model=model, parameters={**values, "albedo": albedo}, mottling=0.02)
-    scans = [drawn_scan(rig, sample, number, draws) for number in range(draws)]
+    scans = [drawn_scan(rig, sample, n, draws, shrink=shrink) for n in range(draws)]
     return [deviations(measured(s, folder / str(n)), s.loaded) for n, s in enumerate(scans)]
 
 
@@ -47,12 +49,13 @@ def test_deviations_have_the_size_of_the_stated_uncertainty(
     """Root mean square of (value - truth) / u in each band of view angle and of each parameter.
 
     The points of a scan share most errors, so that a scan counts as about one draw: the limits are
-    1 +- 3 / sqrt(2 draws). Without --slow: one case, few draws. `--junitxml` shows the figures.
+    1 +- 3 / sqrt(2 draws). Without --slow: one case, few draws, small pictures.
+    `--junitxml` shows the figures.
     """
     if not slow and (kind, albedo, rig) != ("matt", 0.03, "paper_1995"):
         pytest.skip("with --slow")
-    draws = 60 if slow else 4
-    found = _deviations(rig, kind, albedo, draws, tmp_path)
+    draws, shrink = (60, 1) if slow else (4, 3)
+    found = _deviations(rig, kind, albedo, draws, shrink, tmp_path)
     wrong = []
     for name, own in {**by_band(found), **by_parameter(found)}.items():
         rms, covered = float(np.sqrt(np.mean(own**2))), float(np.mean(np.abs(own) < 1.96))

@@ -32,7 +32,7 @@ from instrument.record.record import Record
 from sim.scene.operator import SimulatedOperator
 from sim.scene.render import electrons_per_s
 from tests.support.paths import CONFIGS
-from tests.support.scans import changed, exact_rig, simulated_scene
+from tests.support.scans import changed, exact_rig, shrunk, simulated_scene
 from tests.support.whole_scans.stopped_scan import scan
 
 BANDS_DEG = ((0.0, 30.0), (30.0, 60.0), (60.0, 75.0), (75.0, 85.0))
@@ -81,13 +81,19 @@ def _parts(series: int) -> FloatArray:
 
 
 def drawn_scan(
-    rig: str, sample: SimulatedSample, number: int, series: int, bits: int | None = None
+    rig: str,
+    sample: SimulatedSample,
+    number: int,
+    series: int,
+    bits: int | None = None,
+    shrink: int = 1,
 ) -> Drawn:
     """Scan `number` of a series, which is its seed: two incidences and 19 view angles.
 
-    The tile is known exactly.
+    The tile is known exactly. shrink: rows and columns of the camera are divided by it.
     """
-    demo = load_protocol(CONFIGS / "protocols" / "demo.yaml", CONFIGS / "rigs" / f"{rig}.yaml")
+    path = CONFIGS / "rigs" / f"{rig}.yaml"
+    demo = shrunk(load_protocol(CONFIGS / "protocols" / "demo.yaml", path), shrink)
     part = _parts(series)[:, number]
     normal = [NormalDist().inv_cdf(p) for p in part]
     camera = demo.rig.camera
