@@ -38,10 +38,10 @@ RANGE = {
 }  # fmt: skip
 
 
-def samples(name: str, count: int) -> list[dict[str, float]]:
+def samples(name: str, seeds: range) -> list[dict[str, float]]:
     """Random truths, every fourth with the narrowest lobe."""
     found = []
-    for seed in range(count):
+    for seed in seeds:
         rng = np.random.default_rng(seed)
         truth = {p.name: float(rng.uniform(*RANGE[p.name])) for p in MODELS[name].parameters}
         if "lobe_sigma_deg" in truth and seed % 4 == 0:
@@ -66,6 +66,7 @@ def missed(name: str, truth: dict[str, float], m: Measurements) -> str:
     return ", ".join(wrong) and f"{truth}: {', '.join(wrong)}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stated", [True, False], ids=["with u", "without u"])
 @pytest.mark.parametrize(
     ("name", "count"),
@@ -89,9 +90,14 @@ def missed(name: str, truth: dict[str, float], m: Measurements) -> str:
         ("lambert+beckmann_spizzichino", 5),
     ],
 )
-def test_truths_are_found_from_the_data_alone(name: str, count: int, stated: bool) -> None:
+def test_truths_are_found_from_the_data_alone(
+    name: str, count: int, stated: bool, slow: bool
+) -> None:
+    """All truths with `pytest --slow`; else a fifth of them with u, and another fifth without."""
+    few = -(-count // 5)
+    bounded = range(few) if stated else range(few, 2 * few)
     failures = []
-    for truth in samples(name, count):
+    for truth in samples(name, range(count) if slow else bounded):
         m = noise_free(name, truth)
         if not stated:
             m = Measurements.bare(m.theta_i_deg, m.theta_r_deg, m.dphi_deg, m.brdf)
