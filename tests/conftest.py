@@ -24,10 +24,8 @@ if TYPE_CHECKING:
     from tests.support.v4l2.remote_camera import RemoteCamera
 
 # How fast an example runs depends on the machine: speed is tested as ratios, elsewhere.
-settings.register_profile(
-    "any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow]
-)
-settings.load_profile("any machine")
+settings.register_profile("whole", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("bounded", settings.get_profile("whole"), max_examples=40)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -38,8 +36,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     real.addoption("--axis", action="append", help="an axis of it to move; default: all motors")
 
 
-def pytest_configure() -> None:
-    """Undo what `nohup` and a shell's background do: programs under test would ignore stops."""
+def pytest_configure(config: pytest.Config) -> None:
+    """Load the number of random examples, and undo what `nohup` and a shell's background do: programs under test would ignore stops."""
+    settings.load_profile("whole" if config.getoption("--slow") else "bounded")
     defaults = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL,
                 signal.SIGQUIT: signal.SIG_DFL}  # fmt: skip
     for number, default in defaults.items():

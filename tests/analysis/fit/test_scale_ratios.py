@@ -46,7 +46,7 @@ def pull(result: FitResult, name: str) -> float:
 @pytest.mark.parametrize("name", CASES)
 def test_a_ratio_is_right_within_its_u(name: str, unit: float | None, slow: bool) -> None:
     """The standard deviation of n pulls has a standard error of 1/sqrt(2 n)."""
-    count = 200 if slow else 6
+    count = 200 if slow else 4 if unit is None else 3
     pulls = [pull(fit(MODELS[name], measured(name, n, unit)), name) for n in range(count)]
     spread = np.sqrt(np.mean(np.square(pulls)))
     assert abs(spread - 1) < (4 / np.sqrt(2 * count))

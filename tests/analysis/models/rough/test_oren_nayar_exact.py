@@ -45,7 +45,7 @@ def reference(theta_i: float, theta_r: float, dphi: float) -> FloatArray:
 
     points = np.append(slope_kinks(larger, smaller, np.array([dphi])), np.radians([1, 3, 10]))
     inside = np.unique(points[(points > 1e-6) & (points < 1.5707)])
-    options = {"points": inside, "epsrel": 1e-9, "epsabs": 1e-12, "norm": "max", "limit": 400}
+    options = {"points": inside, "epsrel": 1e-8, "epsabs": 1e-11, "norm": "max", "limit": 400}
     total, _ = quad_vec(integrand, 1e-9, np.pi / 2 - 1e-9, **options)
     return np.asarray(total[1:] / total[0])
 
@@ -75,26 +75,27 @@ def nearly_special(count: int) -> Geometry:
     return Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
 
 
-@pytest.mark.parametrize(("rule", "accuracy"), [(COARSE, 1e-4), (RULE, 1e-6), (FINE, 1e-8)])
-def test_the_rules_keep_their_stated_accuracy(rule: Rule, accuracy: float) -> None:
-    for geometry in (special_directions(400), nearly_special(400)):
-        for sigma in (0.5, 5.0, 20.0, 60.0):
-            best = oren_nayar_exact_brdf(geometry, 1.0, sigma, Rule(26, 18, 90))
+@pytest.mark.slow
+@pytest.mark.parametrize("sigma", [0.5, 5.0, 20.0, 60.0])
+def test_the_rules_keep_their_stated_accuracy(sigma: float, slow: bool) -> None:
+    count = 400 if slow else 150
+    for geometry in (special_directions(count), nearly_special(count)):
+        best = oren_nayar_exact_brdf(geometry, 1.0, sigma, Rule(26, 18, 90))
+        for rule, accuracy in ((COARSE, 1e-4), (RULE, 1e-6), (FINE, 1e-8)):
             got = oren_nayar_exact_brdf(geometry, 1.0, sigma, rule)
             np.testing.assert_allclose(got, best, rtol=accuracy)
     clear_profile_cache()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("theta", [86.0, 88.0, 89.0, 89.9, 90.0])
-def test_near_grazing_the_rules_are_worse_as_stated(theta: float) -> None:
-    random = np.random.default_rng(12)
-    other = np.where(
-        random.random(150) < 0.5, random.uniform(0, 1, 150), random.uniform(0.97, 1, 150)
-    )
+def test_near_grazing_the_rules_are_worse_as_stated(theta: float, slow: bool) -> None:
+    random, n = np.random.default_rng(12), 150 if slow else 50
+    other = np.where(random.random(n) < 0.5, random.uniform(0, 1, n), random.uniform(0.97, 1, n))
     geometry = Geometry.from_degrees(
         theta_i=theta,
         theta_r=np.minimum(theta, 89.9) * other,
-        dphi=random.choice([0.0, 30.0, 90.0, 150.0, 170.0, 180.0], 150),
+        dphi=random.choice([0.0, 30.0, 90.0, 150.0, 170.0, 180.0], n),
     )
     for sigma in (1.0, 10.0, 60.0):
         best = oren_nayar_exact_brdf(geometry, 1.0, sigma, Rule(20, 14, 300))

@@ -62,10 +62,11 @@ def test_the_attenuation_is_the_part_that_rays_reach_from_lamp_and_camera() -> N
         assert factor == pytest.approx(np.mean(lit & seen), abs=1e-4)
 
 
-def test_the_interreflection_factor_is_that_of_a_monte_carlo_exchange() -> None:
+@pytest.mark.slow
+def test_the_interreflection_factor_is_that_of_a_monte_carlo_exchange(slow: bool) -> None:
     """Photons leave the seen part of a facet by Lambert's law and count where the next is lit."""
     random = np.random.default_rng(2)
-    n = 200_000
+    n = 200_000 if slow else 50_000
     checked = 0
     for theta_i, theta_r, theta_a, phi_r, phi_a in random_cavities(60, 3):
         towards = Directions(*(np.array(x) for x in (theta_i, 0.0, theta_r, phi_r)))
