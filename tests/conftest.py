@@ -37,7 +37,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Load the number of random examples, and undo what `nohup` and a shell's background do: programs under test would ignore stops."""
+    """Choose the number of random examples, and undo what `nohup` and a shell's background do.
+
+    With those, programs under test would ignore stops.
+    """
     settings.load_profile("whole" if config.getoption("--slow") else "bounded")
     defaults = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL,
                 signal.SIGQUIT: signal.SIG_DFL}  # fmt: skip
