@@ -37,6 +37,7 @@ AT_RESUME = (
         "tile on the table at the resume", "mounted", ("white tile", "nothing"), always, OUTLINE
     ),
 )
+SHRINK = 4  # of the pictures' sides in the normal run
 WARM_UP = 0.01  # of the lamp's output
 
 
@@ -53,11 +54,11 @@ def _false_alarms(rig: str, seed: int, folder: Path, shrink: int) -> list[str]:
 
 @pytest.mark.slow
 def test_sound_scans_raise_no_interlock(slow: bool, tmp_path: Path) -> None:
-    """201 scans of full size with --slow, else 6 small ones."""
+    """201 scans of full size with --slow, else 3 small ones."""
     found = []
-    for seed in range(67 if slow else 2):
-        for rig in RIGS:
-            found += _false_alarms(rig, seed, tmp_path / f"{rig} {seed}", 1 if slow else 4)
+    scans = [(seed, rig) for seed in range(67) for rig in RIGS] if slow else enumerate(RIGS)
+    for seed, rig in scans:
+        found += _false_alarms(rig, seed, tmp_path / f"{rig} {seed}", 1 if slow else SHRINK)
     assert found == []
 
 
@@ -90,7 +91,7 @@ def test_no_point_is_wrong_without_a_flag(
         attacks = [*ATTACKS, *AT_RESUME] if slow else share
         for seed in range(3) if slow else (7,):
             folder = tmp_path / f"{rig} {seed}"
-            loaded = random_scan(rig, seed, shrink=1 if slow else 4, least_frames=3)
+            loaded = random_scan(rig, seed, shrink=1 if slow else SHRINK, least_frames=3)
             for (name, size), outcome in _outcomes(loaded, seed, attacks, folder, slow).items():
                 record_property(f"{rig} {seed}: {name} {size}", outcome.word)
                 if outcome.silent and not may_be_silent(name, size, loaded):

@@ -129,7 +129,7 @@ class Session:
 def test_damaged_replies_give_the_true_position_or_an_error(
     kind: str, slow: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    session, count = Session.of(kind, monkeypatch), 10_000 if slow else 70
+    session, count = Session.of(kind, monkeypatch), 10_000 if slow else 40
     feed(lambda number: str(number).encode(), count, lambda data: session.take(int(data)))
     if kind == "zaber":
         assert session.wrong <= count / 256
@@ -159,7 +159,7 @@ def test_wrong_replies_with_a_valid_checksum_give_a_result_or_an_error(
     session.kind = "oriental tcp"  # a wrong value may be accepted, and a wrong target be answered
     feed(
         lambda number: str(number).encode(),
-        10_000 if slow else 100,
+        10_000 if slow else 40,
         lambda data: session.take(int(data)),
     )
 
@@ -203,7 +203,7 @@ def test_mixed_up_replies_of_a_gateway_are_refused(monkeypatch: pytest.MonkeyPat
         return answer[:place] + bytes([answer[place] ^ rng.randrange(1, 256)]) + answer[place + 1 :]
 
     session.spoil = mixed
-    for number in range(100):
+    for number in range(60):
         session.take(number)
     assert session.wrong == 0
 
@@ -233,7 +233,7 @@ def test_newport_framing_reads_any_line(slow: bool) -> None:
             _or_garbled(lambda text=text: newport_framing.number("stage", "TP", text), _finite)
             _or_garbled(lambda text=text: newport_framing.state("stage", text), _state)
 
-    feed(Mutator(_NEWPORT, 3), FRAMED if slow else 600, read)
+    feed(Mutator(_NEWPORT, 3), FRAMED if slow else 300, read)
 
 
 def _or_garbled(read: Callable[[], object], check: Callable[[object], None]) -> None:
@@ -270,7 +270,7 @@ def test_zaber_framing_reads_any_line(slow: bool) -> None:
             assert (reply.warning + reply.data).isprintable()
             assert zaber_framing.fault([reply.warning, *reply.data.split()]).isprintable()
 
-    feed(Mutator(_ZABER, 4, [b":", b"@", b" "]), FRAMED if slow else 1000, read)
+    feed(Mutator(_ZABER, 4, [b":", b"@", b" "]), FRAMED if slow else 500, read)
 
 
 @pytest.mark.slow
@@ -291,7 +291,7 @@ def test_oriental_framing_reads_any_registers(slow: bool) -> None:
 
     examples = (bytes(40), bytes.fromhex("0000000000000001FFFFFF9C") + bytes(28))
     spoilt = Mutator(examples, 5)
-    feed(lambda n: (spoilt(n) + bytes(40))[:40], FRAMED if slow else 1000, read)
+    feed(lambda n: (spoilt(n) + bytes(40))[:40], FRAMED if slow else 500, read)
 
 
 @pytest.mark.slow
@@ -315,4 +315,4 @@ def test_a_frame_that_the_modbus_framer_accepts_has_a_valid_crc(slow: bool) -> N
                     for last in range(first + 2, len(frame) - 1)
                 )
 
-    feed(Mutator([f + crc(f) for f in frames], 6), FRAMED // 10 if slow else 300, read)
+    feed(Mutator([f + crc(f) for f in frames], 6), FRAMED // 10 if slow else 150, read)
