@@ -85,7 +85,8 @@ class _LastingFile(io.FileIO):
             while left and not self._lost and self._is_ready():
                 left = left[super().write(left[:_CHUNK]) or 0 :]
         except BaseException as error:
-            self._lost = True  # or a flush at the end would fail, or wait, once more
+            # Or a flush at the end would fail, or wait for ever, once more.
+            self._lost = self._patience_s is None or isinstance(error, OSError)
             if not isinstance(error, OSError):
                 raise
             if self._patience_s is None and error.errno not in _GONE:

@@ -14,9 +14,9 @@ import pytest
 from acquisition.live import channel
 from instrument.record.event_kinds import DRIFT, OPERATOR, STOPPED
 from instrument.record.record import FILE_NAME, Record
-from tests.support.command import gonio
-from tests.support.paths import ROOT
-from tests.support.scans import small_demo
+from tests.support.command import gonio_here
+from tests.support.paths import CONFIGS, ROOT
+from tests.support.scans import TWO_MODELS, small_demo
 from tests.support.terminal.session import TerminalSession
 from tests.support.timing.deadline import wait_for
 
@@ -25,12 +25,17 @@ pytestmark = [pytest.mark.waits, pytest.mark.usefixtures("own_folder")]
 LONG_S = 120.0
 
 
+def the_scan(run: Path) -> tuple[object, ...]:
+    """Python's arguments; with the bench's own pictures there is time enough to pause the scan."""
+    files = (small_demo(run.parent, TWO_MODELS), "--rig", CONFIGS / "rigs" / "bench_12bit.yaml")
+    return ("-m", "acquisition", "run", *files, "--out", run)
+
+
 @contextmanager
 def scanning(run: Path) -> Iterator[tuple[subprocess.Popen[str], Path]]:
     """Run the demonstration, paused as soon as it can be; yield its process and its channel."""
-    command = [sys.executable, "-m", "acquisition", "run", small_demo(run.parent), "--out", run]
     with subprocess.Popen(
-        command, cwd=ROOT,
+        [sys.executable, *the_scan(run)], cwd=ROOT,
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
         try:
@@ -44,8 +49,7 @@ def scanning(run: Path) -> Iterator[tuple[subprocess.Popen[str], Path]]:
 @contextmanager
 def paused_at_a_terminal(run: Path) -> Iterator[TerminalSession]:
     """Run the demonstration at a terminal, and press the key that pauses it, once it is told."""
-    command = ("-m", "acquisition", "run", small_demo(run.parent), "--out", run)
-    with TerminalSession(command) as session:
+    with TerminalSession(the_scan(run)) as session:
         session.read_until("p pauses the scan and lets it go on; Ctrl-C stops it", LONG_S)
         session.press("p")
         session.read_until("paused at theta_i ", LONG_S)
@@ -96,7 +100,7 @@ def test_an_abort_in_a_pause_leaves_a_safe_rig_and_a_run_that_resumes(tmp_path: 
     with Record.open(run) as record:
         stopped = [text for _, kind, text in record.events() if kind == STOPPED]
         assert stopped == ["stopped by the operator on the live page"]
-    assert gonio("resume", run, "--yes").returncode == 0
+    assert gonio_here("resume", run, "--yes").returncode == 0
     assert json.loads((run / "fit.json").read_text())["verdict"] == "adequate"
 
 

@@ -18,13 +18,13 @@ from acquisition.terminal import streams
 from acquisition.terminal.streams import HANDLER, lasting_streams
 from tests.support.command import gonio_here, own_signals
 from tests.support.paths import ROOT
-from tests.support.scans import small_demo
+from tests.support.scans import TWO_MODELS, small_demo
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("finished")
-    done = gonio_here("run", small_demo(folder), "--out", folder / "run")
+    done = gonio_here("run", small_demo(folder, TWO_MODELS), "--out", folder / "run")
     assert done.returncode == 0, done.stderr
     return folder / "run"
 
@@ -152,3 +152,18 @@ def test_an_interrupt_just_before_a_wait_ends_it(monkeypatch: pytest.MonkeyPatch
         monkeypatch.setattr(streams.select, "poll", _Interrupted)
         with pytest.raises(KeyboardInterrupt), lasting_streams():
             sys.stdout.writelines("x" * 4095 + "\n" for _ in range(100))
+
+
+def test_a_message_after_an_interrupted_one_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A Ctrl-C may come in the midst of a line of progress, and how the scan ended follows it."""
+    reading, writing = os.pipe()
+    with os.fdopen(reading, "rb") as reader:
+        with os.fdopen(writing, "w", encoding="utf-8") as ours:
+            monkeypatch.setattr(sys, "stderr", ours)
+            with lasting_streams():
+                with monkeypatch.context() as once:
+                    once.setattr(streams.select, "poll", _Interrupted)
+                    with pytest.raises(KeyboardInterrupt):
+                        sys.stderr.write("5/21\n")
+                sys.stderr.write("stopped\n")
+        assert reader.read().endswith(b"stopped\n")

@@ -19,6 +19,7 @@ _OWN_TERMINAL = (
     "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
     "os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
 )
+_END = "\x00the end\x00"
 
 
 class TerminalSession(Closeable):
@@ -70,6 +71,7 @@ class TerminalSession(Closeable):
         while self._process.poll() is None:
             assert time.monotonic() < until_s, f"it runs on: {self.text!r}"
             self.look(0.01)
-        while self.look(0.0):
-            pass
+        os.write(self._slave, _END.encode())  # the kernel may still hold what came before it
+        self.read_until(_END, deadline_s)
+        self.text = self.text.replace(_END, "")
         return self._process.returncode
