@@ -51,10 +51,12 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ReadyProcess]:
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory, protocol: Path, command: ReadyProcess) -> Path:
-    folder = tmp_path_factory.mktemp("emulated") / "run"
-    done = command.run("run", protocol, "--rig", RIG, "--out", folder)
+    folder = tmp_path_factory.mktemp("emulated")
+    rig = folder / "rig.yaml"
+    rig.write_text(RIG.read_text().replace(*QUICK))
+    done = command.run("run", protocol, "--rig", rig, "--out", folder / "run")
     assert done.returncode == 0, done.stderr
-    return folder
+    return folder / "run"
 
 
 def test_the_fit_recovers_the_true_parameters_within_their_uncertainty(run: Path) -> None:
