@@ -37,15 +37,20 @@ def small_scan(rig: str = "bench_12bit", shrink: int = 5) -> Loaded:
 def shortest_scan() -> Loaded:
     """`small_scan` with small pictures, two views at each incidence, a drift check after each two.
 
-    Nine steps: two of the tile, a drift check, and twice two points and a drift check.
+    Nine steps: two of the tile, a drift check, and twice two points and a drift check. The sample
+    renders fast.
     """
     loaded = small_scan(shrink=10)
     (sweep,), references = loaded.protocol.sweeps, loaded.protocol.references
+    sample = loaded.protocol.simulated_sample
+    assert sample is not None
+    matt = {"model": "lambert", "parameters": {"albedo": 0.8}}
     often = DriftCheck(theta_r_deg=10.0, every_points=2)
     return changed(
         loaded,
         sweeps=[{**sweep, "theta_r_deg": [-35.0, 35.0]}],
         references=references.model_copy(update={"drift_check": often}),
+        simulated_sample=sample.model_copy(update=matt),
     )
 
 
