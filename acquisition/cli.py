@@ -20,7 +20,7 @@ from acquisition.cli_parts import Commands, Json, RigOnly
 from acquisition.new_cli import new
 from acquisition.terminal import stop_signals
 from acquisition.terminal.streams import lasting_streams
-from instrument.errors import StorageError
+from instrument.errors import InputError, StorageError
 
 # The program's arrays are small: several threads in linear algebra would only cost time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -307,6 +307,11 @@ def grab(
     """
     from acquisition.commands.grab import aim_camera, grab_frame
 
+    if live and (out is not None or json):
+        raise InputError(
+            "gonio grab: --live shows the picture in a browser and writes nothing: "
+            "leave out --out and --json, or --live"
+        )
     if live:
         aim_camera(rig, protocol, theta_r_deg=theta_r_deg, exposure_s=exposure_s)
     else:

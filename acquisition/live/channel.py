@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from instrument.errors import GonioError
+from instrument.errors import GonioError, StorageError
 
 STATE_FILE, PICTURE_FILE, SOCKET_FILE = "state.json", "newest.jpg", "control"
 WATCH, PAUSE, RESUME, ABORT = "watch", "pause", "resume", "abort"
@@ -36,9 +36,14 @@ class NoScanError(GonioError):
 def channel_of(record_file: Path) -> Path:
     """Return the folder of the channel of a run, whether or not a scan is under way.
 
-    Raises `OSError` if the record's file is missing.
+    Raises `StorageError` if the record's file is missing.
     """
-    file = record_file.stat()
+    try:
+        file = record_file.stat()
+    except OSError as error:
+        raise StorageError(
+            f"{record_file}: {error.strerror}: is the run's folder there?"
+        ) from error
     return user_folder() / f"{file.st_dev:x}-{file.st_ino:x}"
 
 

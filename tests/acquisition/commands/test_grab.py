@@ -32,6 +32,17 @@ def test_a_frame_for_aiming(tmp_path: Path) -> None:
     assert found["window_max_dn"] <= found["frame_max_dn"] <= found["full_scale_dn"]
 
 
+@pytest.mark.parametrize("written", [("-o", "aim.png"), ("--json",)])
+def test_a_picture_in_the_browser_is_not_said_to_be_written(
+    written: tuple[str, ...], tmp_path: Path
+) -> None:
+    done = gonio("grab", "--rig", BENCH, "--live", *written, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "--live" in done.stderr
+    assert "leave out" in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
 def rig_file(folder: Path, camera: dict[str, object], defects: dict[str, object]) -> Path:
     """The bench with changes of its camera."""
     rig = yaml.safe_load(BENCH.read_text())

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.live import channel
+from instrument.errors import StorageError
 
 pytestmark = pytest.mark.usefixtures("own_folder")
 
@@ -20,6 +21,11 @@ def test_the_channel_of_a_run_follows_its_record_wherever_the_run_is_moved(tmp_p
     (tmp_path / "other").write_bytes(b"")
     assert channel.channel_of(moved / "record.sqlite") == before
     assert channel.channel_of(tmp_path / "other") != before
+
+
+def test_a_run_whose_record_is_gone_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StorageError, match=r"record\.sqlite: .*is the run's folder there\?"):
+        channel.channel_of(tmp_path / "record.sqlite")
 
 
 @pytest.mark.parametrize("mode", [0o755, 0o710, 0o701])
