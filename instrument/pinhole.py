@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -58,8 +59,12 @@ class Pinhole:
         """Return the 3 x 3 homography from the plane z = height_mm to the image.
 
         It maps (x, y, 1) in mm to (column, row, 1) in pixels, times a depth. `theta_r_deg` is
-        signed. The camera's position is beam_length_mm * camera_direction.
+        signed. The camera's position is beam_length_mm * camera_direction. Read-only: the last
+        ones are kept.
         """
+        return _kept_homography(self, theta_r_deg, height_mm)
+
+    def _homography(self, theta_r_deg: float, height_mm: float) -> FloatArray:
         x, y, z = (self.beam_length_mm * camera_direction(theta_r_deg)).tolist()
         plane = np.array([[1.0, 0, -x], [0, 1.0, -y], [0, 0, height_mm - z]])
         matrix: FloatArray = self._intrinsic() @ self._orientation(theta_r_deg) @ plane
@@ -112,6 +117,13 @@ class Pinhole:
                 [-x, -y, z],
             ]
         )
+
+
+@lru_cache(maxsize=64)
+def _kept_homography(camera: Pinhole, theta_r_deg: float, height_mm: float) -> FloatArray:
+    matrix = camera._homography(theta_r_deg, height_mm)
+    matrix.flags.writeable = False
+    return matrix
 
 
 def apply_homography(matrix: FloatArray, points: ArrayLike) -> FloatArray:

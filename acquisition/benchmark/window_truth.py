@@ -21,6 +21,7 @@ LAMP_MM, LAMP_DEG = 1000.0, 45.0
 WAVE_DEPTH = 0.05
 _WAVES_MM = (9.0, 13.0)  # the texture is coarser than any pixel here
 _MARGIN_PX = 3
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(60)
 
 
 @cache
@@ -47,9 +48,8 @@ def radiance(points_mm: FloatArray) -> FloatArray:
 
 def patch_mean(quantity: Callable[[FloatArray], FloatArray], side_mm: float) -> float:
     """Return the mean of a quantity of points (..., 2) in mm over a square patch, by quadrature."""
-    t, w = np.polynomial.legendre.leggauss(60)
-    points = np.stack(np.meshgrid(t * side_mm / 2, t * side_mm / 2), axis=-1)
-    return float(w @ quantity(points) @ w / 4)
+    points = np.stack(np.meshgrid(_NODES * side_mm / 2, _NODES * side_mm / 2), axis=-1)
+    return float(_WEIGHTS @ quantity(points) @ _WEIGHTS / 4)
 
 
 def picture(theta_r_deg: float, camera: Pinhole) -> FloatArray:

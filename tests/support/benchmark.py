@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from typing import Any
+from xml.etree import ElementTree
 
 from acquisition.benchmark.effort import Effort
 from acquisition.benchmark.output.charts import MAIN
-from acquisition.benchmark.result import BenchmarkResult
+from acquisition.benchmark.result import BenchmarkResult, MapPicture
 from acquisition.benchmark.study import Study
 from acquisition.benchmark.trial import Trial, select
 
@@ -71,6 +73,22 @@ def trial_of(study: Study, scene: str, label: str) -> Trial:
 def worst(study: Study, label: str) -> float:
     """The largest error of a method over all scenes."""
     return max(trial_of(study, scene, label).error for scene in study.scenes)
+
+
+def check_complete(picture: MapPicture) -> None:
+    """Fail unless a map is a picture with its numbers, readable in grey."""
+    page = ElementTree.fromstring(picture.svg)  # our own text
+    words = " ".join("".join(e.itertext()) for e in page.iter() if e.tag.endswith("text"))
+    assert "°" in words or "g" in words
+    assert "$" not in words  # no markup is left in a label
+    assert picture.caption
+    sizes = {len(values) for values in picture.columns.values()}
+    assert len(sizes) == 1
+    assert sizes.pop() > 100
+    if "window" not in picture.title:  # its lines have markers and dashes of their own
+        # Without colours: every fill and stroke is a grey.
+        for colour in set(re.findall(r"#([0-9a-fA-F]{6})", picture.svg)):
+            assert colour[:2].lower() == colour[2:4].lower() == colour[4:].lower()
 
 
 def from_json(text: str) -> BenchmarkResult:

@@ -208,7 +208,9 @@ def _fit_line(
             return None
         line = y + (along - x) * dy / dx
         scatter = 1.4826 * float(np.median(np.abs(steps[used] - line[used])))
-        used = np.isfinite(steps) & (np.abs(steps - line) <= max(3 * scatter, 0.05))
+        before, used = used, np.isfinite(steps) & (np.abs(steps - line) <= max(3 * scatter, 0.05))
+        if np.array_equal(before, used):
+            break
     if scatter > max_scatter_px or used.sum() < _LEAST_SHARE * len(stations):
         return None
     ends = [0, -1]

@@ -12,7 +12,7 @@ import pytest
 from acquisition.benchmark.command import run_benchmark
 from acquisition.benchmark.result import MapPicture
 from tests.support.benchmark import from_json, result
-from tests.support.command import gonio
+from tests.support.command import gonio_here
 
 
 def made_up_maps() -> Iterator[MapPicture]:
@@ -55,13 +55,13 @@ def test_the_command_writes_all_files_with_maps(
 def test_a_folder_that_is_not_empty_is_refused(tmp_path: Path) -> None:
     (tmp_path / "kept.txt").write_text("mine")
     for wrong in (tmp_path, tmp_path / "kept.txt"):
-        done = gonio("bench", "--quick", "--out", wrong)
+        done = gonio_here("bench", "--quick", "--out", wrong)
         assert done.returncode == 2
         assert f"{wrong}: --out must be absent or an empty folder" in done.stderr
     assert {p.name for p in tmp_path.iterdir()} == {"kept.txt"}
 
 
 def test_the_folder_must_be_named() -> None:
-    done = gonio("bench")
+    done = gonio_here("bench")
     assert done.returncode == 2
     assert "--out" in done.stderr

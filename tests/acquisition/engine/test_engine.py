@@ -19,14 +19,7 @@ from instrument.config.rig import Rig
 from instrument.devices import Frame, Request
 from instrument.errors import DeviceError, OperatorStop
 from instrument.record.record import FILE_NAME, Record
-from tests.support.scans import small_scan
 from tests.support.stand_ins import PassThrough, Spy
-
-
-@pytest.fixture(scope="module")
-def small() -> Loaded:
-    """Two incidences, five view angles, all references; all pixels."""
-    return small_scan(shrink=1)
 
 
 def run(loaded: Loaded, record: Record, devices: Devices | None = None) -> Plan:

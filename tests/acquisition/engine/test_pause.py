@@ -21,6 +21,7 @@ from instrument.record.reading import Reading
 from instrument.record.record import Record
 from tests.support.scans import undated
 from tests.support.stand_ins import PassThrough
+from tests.support.whole_scans.stopped_scan import stops
 
 
 class PausedScan:
@@ -57,21 +58,23 @@ class PausedScan:
             self._switch.turn(on=False, by="in a test")
 
 
+@pytest.mark.slow
 def test_paused_after_any_step_the_rest_is_the_same_to_the_last_digit(
-    small: Loaded, whole: list[Reading], tmp_path: Path
+    small: Loaded, whole: list[Reading], tmp_path: Path, slow: bool
 ) -> None:
-    for step in range(-1, len(whole) - 1):
+    for step in (-1, *stops(whole, slow)):
         with Record.create(tmp_path / str(step), {}) as record:
             PausedScan(small, record, {step}).run()
             assert undated(record.readings()) == whole
             assert not any(check.jumped for check in record.checks())
 
 
+@pytest.mark.slow
 def test_paused_again_and_again_the_rest_is_the_same(
-    small: Loaded, whole: list[Reading], tmp_path: Path
+    small: Loaded, whole: list[Reading], tmp_path: Path, slow: bool
 ) -> None:
     chosen = random.Random(20)
-    for number in range(4):
+    for number in range(4 if slow else 2):
         after = {step for step in range(-1, len(whole) - 1) if chosen.random() < 0.4}
         with Record.create(tmp_path / str(number), {}) as record:
             scan = PausedScan(small, record, set(after))

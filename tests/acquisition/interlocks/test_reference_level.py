@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -127,20 +128,29 @@ def test_a_tile_follows_its_table_where_it_has_one(tmp_path: Path) -> None:
     assert not angle_doubt(*white, drifts, rig)
 
 
-def _undisturbed(loaded: Loaded, folder: Path) -> Reduced:
-    """Values of a scan without a fault."""
-    with Record.create(folder, {}) as record:
-        scan(loaded, record)
-        return reduce(record.readings(), loaded.protocol, ())
+Undisturbed = Callable[..., Reduced]
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Undisturbed:
+    """Return values of a small scan without a fault, by rig and by `read_again`."""
+
+    @cache
+    def values(rig_name: str, *, read_again: bool = False) -> Reduced:
+        loaded = _read_again(rig_name) if read_again else small_scan(rig_name)
+        with Record.create(tmp_path_factory.mktemp(rig_name) / "run", {}) as record:
+            scan(loaded, record)
+            return reduce(record.readings(), loaded.protocol, record.checks())
+
+    return values
 
 
 @pytest.mark.parametrize("wrong_deg", [30.0, 60.0])
 def test_a_lamp_set_by_hand_at_a_wrong_angle_stops_the_scan_and_all_of_it_is_measured_again(
-    wrong_deg: float, record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    wrong_deg: float, record: Record, undisturbed: Undisturbed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One of two settings is wrong, the tile at the second is read after its points."""
-    loaded = small_scan("paper_1995")
-    good = _undisturbed(loaded, tmp_path / "good")
+    loaded, good = small_scan("paper_1995"), undisturbed("paper_1995")
     off, real = {wrong_deg: 5.0 if wrong_deg > 45 else 16.0}, Scene.set_axis
 
     def set_axis(scene: Scene, axis: str, angle_deg: float) -> None:
@@ -209,23 +219,24 @@ def test_the_tile_at_the_end_may_differ_by_what_uncertainties_explain(
 
 @pytest.mark.parametrize("rig_name", RIGS)
 def test_a_sound_scan_has_the_same_values_with_the_tile_at_the_end(
-    rig_name: str, record: Record, tmp_path: Path
+    rig_name: str, undisturbed: Undisturbed
 ) -> None:
-    scan(_read_again(rig_name), record)
-    once = _undisturbed(small_scan(rig_name), tmp_path / "once")
-    found = reduce(record.readings(), _read_again(rig_name).protocol, record.checks())
+    found = undisturbed(rig_name, read_again=True)
     assert not any(found.flags)
-    assert found.brdf == pytest.approx(once.brdf, rel=0.01)
+    assert found.brdf == pytest.approx(undisturbed(rig_name).brdf, rel=0.01)
 
 
 @pytest.mark.parametrize("rig_name", RIGS)
 @pytest.mark.parametrize("level", [0.97, 0.02])
 def test_a_lamp_that_changes_after_the_tile_is_told_by_the_tile_at_the_end(
-    rig_name: str, level: float, record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    rig_name: str,
+    level: float,
+    record: Record,
+    undisturbed: Undisturbed,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The drift checks all come after the change: they agree with one another."""
-    loaded = _read_again(rig_name)
-    good = _undisturbed(loaded, tmp_path / "good")
+    loaded, good = _read_again(rig_name), undisturbed(rig_name, read_again=True)
     first = next(step.index for step in make_plan(loaded).steps if step.kind == "drift")
     fault = LampFault(at_step={first: level}).install(monkeypatch)
     with pytest.raises(Interlock, match=r"white tile: white tile at|light: white tile at"):

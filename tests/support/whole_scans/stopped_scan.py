@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Sequence
 
 from acquisition.engine.engine import Devices, Engine
 from acquisition.engine.resume import Progress
 from acquisition.plan.plan import Step, make_plan
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded
+from instrument.record.reading import Reading
 from instrument.record.record import Record
 
 
 class Cut(Exception):
     """The process dies here."""
+
+
+def stops(readings: Sequence[Reading], slow: bool) -> list[int]:
+    """Steps after which a scan is stopped: all but the last, or one between each two kinds."""
+    between = itertools.pairwise(reading.kind for reading in readings)
+    first = {pair: step for step, pair in reversed(list(enumerate(between)))}
+    return list(range(len(readings) - 1)) if slow else sorted(first.values())
 
 
 def scan(

@@ -6,18 +6,27 @@ import numpy as np
 import pytest
 
 from acquisition.benchmark.maps.model_maps import rough_picture
+from acquisition.benchmark.result import MapPicture
 from analysis.models import MODELS
 from instrument.geometry import Geometry
+from tests.support.benchmark import check_complete
+
+FORM = "oren_nayar_qualitative"
 
 
-def test_the_reasons_are_in_the_picture() -> None:
-    svg = rough_picture("oren_nayar_qualitative").svg
-    assert "leaves" in svg
-    assert "interreflection" in svg
+@pytest.fixture(scope="module")
+def picture() -> MapPicture:
+    return rough_picture(FORM)
 
 
-def test_the_numbers_of_a_map_are_the_errors() -> None:
-    columns = rough_picture("oren_nayar").columns
+def test_the_map_is_complete_and_its_reasons_are_in_the_picture(picture: MapPicture) -> None:
+    check_complete(picture)
+    assert "leaves" in picture.svg
+    assert "interreflection" in picture.svg
+
+
+def test_the_numbers_of_a_map_are_the_errors(picture: MapPicture) -> None:
+    columns = picture.columns
     random = np.random.default_rng(1)
     for k in random.integers(0, len(columns["error_percent"]), 12):
         row = {name: float(values[k]) for name, values in columns.items()}
@@ -28,6 +37,6 @@ def test_the_numbers_of_a_map_are_the_errors() -> None:
         for albedo in (1e-9, 1.0):
             values = {"albedo": albedo, "sigma_deg": row["sigma_deg"]}
             exact = MODELS["oren_nayar_exact"].brdf(there, **values)
-            off.append(abs(float(MODELS["oren_nayar"].brdf(there, **values) / exact - 1)))
+            off.append(abs(float(MODELS[FORM].brdf(there, **values) / exact - 1)))
         # The table in between is good to a percent of the value at the worst.
         assert row["error_percent"] == pytest.approx(100 * max(off), rel=0.02, abs=0.3)

@@ -16,11 +16,14 @@ from acquisition.benchmark.window_truth import shipped_camera
 from acquisition.measure.window import window_at
 from instrument.config.load import load_protocol
 from instrument.pinhole import Pinhole
+from tests.support.benchmark import check_complete
 from tests.support.paths import CONFIGS
 
 
-def test_the_numbers_show_where_the_window_fails() -> None:
-    columns = window_picture().columns
+def test_the_map_is_complete_and_its_numbers_show_where_the_window_fails() -> None:
+    picture = window_picture()
+    check_complete(picture)
+    columns = picture.columns
     small = [
         (view, pixels)
         for rig, view, pixels in zip(
