@@ -51,6 +51,13 @@ def _model_names(incomplete: str) -> list[str]:
     return completed_names(incomplete)
 
 
+def _format_names(incomplete: str) -> list[str]:
+    """Completion in the shell of formats of files."""
+    from analysis.exchange.formats import FORMATS
+
+    return _among(tuple(FORMATS))(incomplete)
+
+
 ProtocolFile = Annotated[Path, typer.Argument(help="The protocol, a YAML file.")]
 RigFile = Annotated[
     Path | None, typer.Option("--rig", help="A rig file in place of the one the protocol names.")
@@ -218,6 +225,25 @@ def report(folder: RunFolder, json: Json = False) -> None:
     from acquisition.commands.scan import report_run
 
     report_run(folder, as_json=json)
+
+
+@app.command()
+def export(
+    folder: RunFolder,
+    format: Annotated[
+        str,
+        typer.Option("--format", help="Format of the file: csv.", autocompletion=_format_names),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File to write.")],
+) -> None:
+    """Write a run in the format of another program; points with a flag are left out.
+
+    What is interpolated or modelled is marked as such. No file is written where the format cannot
+    hold the run.
+    """
+    from acquisition.commands.outcomes.export import export_run
+
+    export_run(folder, format, output)
 
 
 @app.command()

@@ -1,0 +1,33 @@
+"""Formats of `gonio export`, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+from analysis.exchange.exported import Export
+
+
+class Format(NamedTuple):
+    """Format of a file.
+
+    suffix: of its file name. about: what it holds and who reads it, in a few words. files: yields
+    name and content of each file that an export consists of, the main one first; it raises
+    `InputError` for what the format cannot hold, before anything is written.
+    """
+
+    suffix: str
+    about: str
+    files: Callable[[Export, str], Iterator[tuple[str, bytes]]]
+
+
+def _own_table(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
+    yield f"{stem}.csv", export.own_table.encode()
+
+
+FORMATS: Mapping[str, Format] = MappingProxyType(
+    {
+        "csv": Format(".csv", "all that was measured, as measurements.csv", _own_table),
+    }
+)

@@ -1,0 +1,62 @@
+"""`gonio export`: what a run gives to other programs, and what it refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from analysis.exchange.formats import FORMATS
+from tests.support.command import gonio_here as gonio
+from tests.support.scans import small_demo
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("exported")
+    done = gonio("run", small_demo(folder, "lambert, oren_nayar"), "--out", folder / "run")
+    assert done.returncode == 0, done.stderr
+    return folder / "run"
+
+
+def test_csv_is_the_table_of_the_run(run: Path, tmp_path: Path) -> None:
+    done = gonio("export", run, "--format", "csv", "-o", tmp_path / "mine.csv")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == [str(tmp_path / "mine.csv")]
+    assert (tmp_path / "mine.csv").read_bytes() == (run / "measurements.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("format_name", "file", "words"),
+    [
+        ("cvs", "mine.csv", "did you mean csv?"),
+        ("excel", "mine.csv", "allowed: csv"),
+        ("csv", "mine.txt", "must end in .csv"),
+        ("csv", "mine", "must end in .csv"),
+    ],
+)
+def test_a_wrong_format_or_name_writes_nothing(
+    run: Path, tmp_path: Path, format_name: str, file: str, words: str
+) -> None:
+    done = gonio("export", run, "--format", format_name, "-o", tmp_path / file)
+    assert done.returncode == 2
+    assert words in " ".join(done.stderr.split())
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_is_no_run_is_named(tmp_path: Path) -> None:
+    done = gonio("export", tmp_path, "--format", "csv", "-o", tmp_path / "mine.csv")
+    assert done.returncode == 2
+    assert str(tmp_path) in "".join(done.stderr.split())
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_missing_folder_ends_with_its_name(run: Path, tmp_path: Path) -> None:
+    done = gonio("export", run, "--format", "csv", "-o", tmp_path / "none" / "mine.csv")
+    assert done.returncode == 3
+    assert "none" in done.stderr
+
+
+def test_the_help_names_every_format() -> None:
+    helped = gonio("export", "--help").stdout
+    assert [name for name in FORMATS if name not in helped] == []
