@@ -14,7 +14,7 @@ from acquisition.cli_parts import errors_as_exit_codes
 from instrument.errors import DeviceError, InputError, NotDetermined, OperatorStop, StorageError
 from tests.support.command import gonio_here as gonio
 from tests.support.paths import CONFIGS
-from tests.support.scans import small_demo
+from tests.support.scans import TWO_MODELS, small_demo
 
 DEADLINE_S = 300.0
 PROTOCOL = CONFIGS / "protocols" / "demo.yaml"
@@ -83,9 +83,10 @@ def test_no_module_is_imported_from_the_working_folder(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "analysis.py").write_text("raise SystemExit('not this one')")
+    protocol = small_demo(tmp_path, TWO_MODELS)
     command = "import sys; sys.path.pop(0); from acquisition.cli import main; main()"
     done = subprocess.run(
-        [sys.executable, "-c", command, "run", small_demo(tmp_path), "--out", tmp_path / "run"],
+        [sys.executable, "-c", command, "run", protocol, "--out", tmp_path / "run"],
         cwd=tmp_path, capture_output=True, text=True, check=False, timeout=DEADLINE_S,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
