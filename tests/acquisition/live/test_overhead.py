@@ -1,4 +1,4 @@
-"""Cost of the live page to a scan in real time, with a client that reads and one that stalls.
+"""Cost of the live page to a scan in real time: a browser, a client that reads, one that stalls.
 
 The scan time of a point is the engine's own, without homing and darks: the difference between first
 and last reading over their number.
@@ -12,7 +12,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -21,8 +21,10 @@ import numpy as np
 import pytest
 
 from instrument.record.record import Record
+from tests.support.live.chromium import missing
+from tests.support.live.watching_browser import WatchingBrowser, watching_browser
 from tests.support.paths import CONFIGS, ROOT
-from tests.support.scans import small_demo
+from tests.support.scans import TWO_MODELS, small_demo
 
 pytest.importorskip("uvicorn", reason="the live page's libraries are not installed")
 pytestmark = [
@@ -58,8 +60,10 @@ def _read_all(line: socket.socket) -> None:
         return
 
 
-def time_a_point_s(folder: Path, protocol: Path, *, watched: bool) -> float:
-    """Scan, watched by two clients or by nobody; return the engine's time of a point in seconds."""
+def time_a_point_s(
+    folder: Path, protocol: Path, *, watched: bool, browser: WatchingBrowser | None = None
+) -> float:
+    """Scan, watched by the browser and two clients or by nobody; return seconds a point."""
     command = [sys.executable, "-m", "acquisition", "run", protocol, "--rig", RIG, "--out", folder]
     with (
         subprocess.Popen(
@@ -72,9 +76,11 @@ def time_a_point_s(folder: Path, protocol: Path, *, watched: bool) -> float:
         said = ""
         for text in scan.stderr:
             said += text
-            found = re.search(r"live page: (\S+)", text)
-            for stalled in (False, True) if found else ():
-                clients.enter_context(client(str(found and found[1]), stalled=stalled))
+            if found := re.search(r"live page: (\S+)", text):
+                if browser is not None:
+                    browser.show(found[1])
+                for stalled in (False, True):
+                    clients.enter_context(client(found[1], stalled=stalled))
         assert scan.wait(120) == 0, said
     assert ("live page" in said) == watched
     with Record.open(folder) as record:
@@ -82,12 +88,29 @@ def time_a_point_s(folder: Path, protocol: Path, *, watched: bool) -> float:
     return (times[-1] - times[0]) / (len(times) - 1)
 
 
-def test_two_clients_one_of_them_stalled_cost_a_scan_no_time(tmp_path: Path, slow: bool) -> None:
-    """Measured: see the note of the change; in the slow form the medians of five pairs."""
-    protocol = small_demo(tmp_path)
-    pairs = [
-        [time_a_point_s(tmp_path / f"{n}{w}", protocol, watched=w) for w in (False, True)]
-        for n in range(5 if slow else 1)
-    ]
+def time_a_pair_s(folder: Path, protocol: Path, *, with_browser: bool) -> tuple[float, float]:
+    """Seconds a point of a scan that nobody watches, and of the same scan watched."""
+    alone_s = time_a_point_s(folder / "alone", protocol, watched=False)
+    if not with_browser:
+        return alone_s, time_a_point_s(folder / "watched", protocol, watched=True)
+    with watching_browser() as browser:
+        watched_s = time_a_point_s(folder / "watched", protocol, watched=True, browser=browser)
+        browser.require_shown()
+    return alone_s, watched_s
+
+
+@pytest.mark.slow
+def test_two_clients_one_of_them_stalled_and_a_browser_cost_a_scan_no_time(
+    tmp_path: Path, slow: bool, record_property: Callable[[str, object], None]
+) -> None:
+    """Medians of five pairs; the bounded form is one pair of shorter scans without a browser."""
+    if slow and missing():
+        pytest.skip(missing())
+    protocol = small_demo(tmp_path, TWO_MODELS)
+    if slow:
+        protocol.write_text(protocol.read_text().replace("num: 9", "num: 33"))
+    folders = [tmp_path / f"{n}" for n in range(5 if slow else 1)]
+    pairs = [time_a_pair_s(folder, protocol, with_browser=slow) for folder in folders]
     alone_s, watched_s = np.median(pairs, axis=0)
+    record_property("time of a point, watched / alone", watched_s / alone_s)
     assert watched_s / alone_s < (MOST if slow else MOST_OF_ONE), pairs

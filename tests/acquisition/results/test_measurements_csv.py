@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterator
 from dataclasses import fields, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,7 @@ from tests.support.whole_scans.stopped_scan import scan
 
 @pytest.fixture(scope="module")
 def reduced(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Reduced]:
-    loaded = small_scan()
+    loaded = loaded_once()
     folder: Path = tmp_path_factory.mktemp("table") / "run"
     with Record.create(folder, {}) as record:
         Engine(loaded.protocol, loaded.rig, open_devices(loaded), record, [].append).run(
@@ -41,8 +42,13 @@ def reduced(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Reduced]:
         yield reduce(record.readings(), loaded.protocol, record.checks())
 
 
+@cache
+def loaded_once() -> Loaded:
+    return small_scan()
+
+
 def text(reduced: Reduced) -> str:
-    return measurements_csv(reduced, 0.01 * reduced.brdf, reduced.parts, small_scan())
+    return measurements_csv(reduced, 0.01 * reduced.brdf, reduced.parts, loaded_once())
 
 
 def table(reduced: Reduced) -> list[dict[str, str]]:
@@ -70,7 +76,7 @@ def test_a_value_that_is_not_known_is_an_empty_cell(reduced: Reduced) -> None:
 
 
 def test_the_table_states_the_rig_and_the_groups_of_shared_errors(reduced: Reduced) -> None:
-    rows, rig = table(reduced), small_scan().rig
+    rows, rig = table(reduced), loaded_once().rig
     assert {row["beam_length_mm"] for row in rows} == {repr(float(rig.beam_length_mm))}
     assert {row["u_theta_r_deg"] for row in rows} == {repr(float(rig.axes.theta_r.u_deg))}
     assert {row["group_white_tile_certificate"] for row in rows} == {"1"}
@@ -154,7 +160,7 @@ def test_metadata_follow_in_each_row_and_change_nothing_else(
         metadata = Metadata(notes=note, operator=operator, wavelength_nm=550.0)
     except ValidationError:
         return  # begins like a formula
-    loaded = changed(small_scan(), metadata=metadata)
+    loaded = changed(loaded_once(), metadata=metadata)
     found = measurements_csv(reduced, 0.01 * reduced.brdf, reduced.parts, loaded)
     rows = list(csv.DictReader(found.split("\n")))
     facts = {"operator": operator.strip(), "wavelength_nm": "550", "notes": note.strip()}

@@ -32,7 +32,7 @@ def small() -> Loaded:
 
 @pytest.fixture(scope="module")
 def full() -> Loaded:
-    return small_scan(shrink=1)  # all pixels of the camera
+    return small_scan(shrink=2)  # pixels enough for small changes
 
 
 @pytest.fixture(scope="module")

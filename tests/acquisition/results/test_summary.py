@@ -23,7 +23,7 @@ from instrument.geometry import Geometry
 from instrument.record.event_kinds import INTERLOCK
 from instrument.record.reading import Check
 from instrument.record.record import Record
-from tests.support.scans import changed, exact_rig, small_scan
+from tests.support.scans import TWO_MODELS, changed, exact_rig, small_scan
 from tests.support.white_tiles import SPECTRALON, table_text, tabled, with_tile
 
 Results = tuple[Loaded, Reduced, Fitted, tuple[str, ...]]
@@ -32,7 +32,7 @@ Results = tuple[Loaded, Reduced, Fitted, tuple[str, ...]]
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
     """A small scan of the rig with an 8-bit camera, whose lamp is set by hand."""
-    loaded = small_scan("paper_1995")
+    loaded = changed(small_scan("paper_1995"), fit=FitConfig(models=TWO_MODELS.split(", ")))
     plan, folder = make_plan(loaded), tmp_path_factory.mktemp("summary") / "run"
     with Record.create(folder, run_meta(loaded, plan)) as record:
         engine = Engine(loaded.protocol, loaded.rig, open_devices(loaded), record, [].append)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, ConsoleMessage, Page
+    from playwright.sync_api import Browser, ConsoleMessage, Page, ViewportSize
 
 CHROMIUM = Path("/usr/bin/chromium")
 DEADLINE_S = 60.0
@@ -52,12 +52,10 @@ class Windows:
         self.complaints: list[str] = []
         self.requested: set[str] = set()
 
-    def open(self, address: str, width: int = 1400, scheme: str = "dark") -> Page:
+    def open(self, address: str, width: int = 1400) -> Page:
         """Open an address in a new window."""
-        context = self._browser.new_context(
-            viewport={"width": width, "height": 1000},
-            color_scheme="light" if scheme == "light" else "dark",
-        )
+        viewport: ViewportSize = {"width": width, "height": 1000}
+        context = self._browser.new_context(viewport=viewport, color_scheme="dark")
         page = context.new_page()
         page.set_default_timeout(1000 * DEADLINE_S)
         page.on("console", self._note)

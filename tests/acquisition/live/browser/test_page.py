@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 from urllib.parse import urlsplit
 
 import pytest
@@ -206,29 +206,6 @@ def test_a_lost_connection_is_told_and_found_again(windows: Windows, tmp_path: P
     windows.complaints = [c for c in windows.complaints if "ERR_" not in c]
 
 
-def test_a_wrong_token_is_refused(windows: Windows, served: MessagePage) -> None:
-    page = windows.open(served.address)
-    top = f"http://{urlsplit(served.address).netloc}"
-    for path in ("/", "/?token=wrong", "/events?token=wrong", "/pictures/1.jpg"):
-        assert page.request.get(f"{top}{path}").status == 403, path
-    refused = page.request.post(f"{top}/actions/abort", headers={"X-Gonio-Token": "wrong"})
-    assert refused.status == 403
-
-
-def test_another_page_of_the_browser_can_ask_for_nothing(
-    windows: Windows, served: MessagePage, tmp_path: Path
-) -> None:
-    """With the token even: another port of this computer is another origin."""
-    tell_scan(served, 5, "pause", "abort")
-    token = urlsplit(served.address).query.removeprefix("token=")
-    wanted = f"http://{urlsplit(served.address).netloc}/actions/abort"
-    with message_page(tmp_path) as other:
-        page = windows.open(other.address)
-        headers = {"Origin": f"http://{urlsplit(other.address).netloc}", "X-Gonio-Token": token}
-        assert page.request.post(wanted, headers=headers).status == 403
-        page.close()
-
-
 def test_a_phone_needs_no_sideways_scrolling(windows: Windows, served: MessagePage) -> None:
     tell_scan(served, POINTS, "pause", "abort")
     served.tell_picture(1)
@@ -243,8 +220,10 @@ def test_colours_follow_the_computer_until_they_are_chosen(
     windows: Windows, served: MessagePage
 ) -> None:
     tell_scan(served, 5)
-    for scheme in ("dark", "light"):
-        page = windows.open(served.address, scheme=scheme)
+    page = windows.open(served.address)
+    schemes: tuple[Literal["dark", "light"], ...] = ("dark", "light")
+    for scheme in schemes:
+        page.emulate_media(color_scheme=scheme)
         expect(page.locator("html")).to_have_attribute("data-theme", scheme)
     page.locator("#theme").select_option("red")
     expect(page.locator("html")).to_have_attribute("data-theme", "red")

@@ -29,8 +29,11 @@ def test_a_foreign_host_is_refused(page: str, host: str) -> None:
         assert ask(page, path, headers={"Host": host}).status == 403
 
 
-@pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1", ""])
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1", ""]
+)
 def test_a_foreign_origin_is_refused(page: str, origin: str) -> None:
+    """With the token even: another port of this computer is another origin."""
     assert ask(page, with_token(page, "/frames/0.jpg"), headers={"Origin": origin}).status == 403
     headers = {"Origin": origin, "X-Gonio-Token": TOKEN}
     assert ask(page, "/actions/abort", "POST", headers).status == 403
@@ -47,6 +50,7 @@ def test_both_names_of_this_computer_are_let_in(page: str) -> None:
 def test_an_action_is_a_post_with_the_token_in_a_header(page: str, method: str) -> None:
     """No link and no form of another page can send a header."""
     assert ask(page, with_token(page, "/actions/abort"), "POST").status == 403
+    assert ask(page, "/actions/abort", "POST", {"X-Gonio-Token": "wrong"}).status == 403
     headers = {"X-Gonio-Token": TOKEN}
     assert ask(page, with_token(page, "/actions/abort"), method, headers).status == 405
 
