@@ -16,7 +16,7 @@ import lmfit
 import numpy as np
 import pytest
 
-from analysis.choice.choice import choose
+from analysis.choice.choice import Choice, choose
 from analysis.data.measurements import Measurements
 from analysis.fit.fit import FitResult, fit
 from analysis.models import MODELS
@@ -64,12 +64,12 @@ def test_the_functional_form_fits_as_with_lmfit_and_about_as_fast(scan: Measurem
 
 
 def test_the_ladder_and_an_exact_candidate_cost_a_few_lmfit_fits(scan: Measurements) -> None:
-    choice = choose(scan, method="functional")
-    assert choice.chosen == "oren_nayar"
+    choices: list[Choice] = []
     ruler = cpu_seconds(lambda: by_lmfit(scan), 5)
     # About 125: 14 candidates, each searched from all its minima. A guard, with room.
-    ladder = cpu_seconds(lambda: choose(scan, method="functional"), 3)
+    ladder = cpu_seconds(lambda: choices.append(choose(scan, method="functional")), 3)
     assert ladder < 170 * ruler
+    assert choices[-1].chosen == "oren_nayar"
     exact: list[FitResult] = []
 
     def fit_exact() -> None:
@@ -83,8 +83,9 @@ def test_the_ladder_and_an_exact_candidate_cost_a_few_lmfit_fits(scan: Measureme
     # About 6: 29 candidates, far from the data. 12 where searches crawl there.
     wave = 1 + 0.05 * np.sin(np.radians(7 * scan.theta_r_deg) + scan.theta_i_deg)
     unexplained = replace(scan, brdf=scan.brdf * wave)
-    assert choose(unexplained, method="functional").verdict == "none adequate"
-    assert cpu_seconds(lambda: choose(unexplained, method="functional"), 3) < 9 * ladder
+    longest = cpu_seconds(lambda: choices.append(choose(unexplained, method="functional")), 3)
+    assert choices[-1].verdict == "none adequate"
+    assert longest < 9 * ladder
 
 
 NUMBER = itertools.count()

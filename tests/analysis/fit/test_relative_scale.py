@@ -104,7 +104,7 @@ def relative_scan() -> tuple[Measurements, FitResult]:
 
 
 @given(exponent=st.floats(-9, 9))
-@settings(max_examples=8)
+@settings(max_examples=4)
 def test_the_unit_of_a_relative_scan_has_no_effect(exponent: float) -> None:
     m, one = relative_scan()
     assert m.u_random is not None
@@ -118,13 +118,17 @@ def test_the_unit_of_a_relative_scan_has_no_effect(exponent: float) -> None:
     assert other.u["sigma_deg"] == pytest.approx(u, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stated", [True, False], ids=["u stated", "no u"])
-def test_unknown_levels_of_the_lamp_leave_the_shape_of_each_incidence(stated: bool) -> None:
+def test_unknown_levels_of_the_lamp_leave_the_shape_of_each_incidence(
+    stated: bool, slow: bool
+) -> None:
     """A level free by its whole value would let any model pass at a chi2 of 1 for each level."""
     m = noise_free(MODEL.name, TRUTH)
     levels = np.array([1000.0, 1700.0, 800.0, 900.0])[m.lamp_setting]
     inside = 0
-    for seed in range(8):
+    seeds = range(8 if slow else 4)
+    for seed in seeds:
         noise = 1 + 0.005 * np.random.default_rng([13, seed]).standard_normal(m.size)
         data = replace(
             m,
@@ -139,4 +143,4 @@ def test_unknown_levels_of_the_lamp_leave_the_shape_of_each_incidence(stated: bo
         assert "sigma_deg" not in found.undetermined
         inside += low <= 30 <= high if u is None else abs(found.values["sigma_deg"] - 30) < 3 * u
         assert found.rms_relative < 0.01 or stated
-    assert inside >= 7
+    assert inside >= len(seeds) - 1

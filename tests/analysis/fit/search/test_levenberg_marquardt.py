@@ -131,8 +131,10 @@ def test_scipy_finds_nothing_lower_than_a_converged_minimum(
         assert found.chi2 <= problem.scipy(found.x) * (1 + 1e-6) + 1e-12
 
 
-def test_nearly_all_searches_converge() -> None:
-    assert sum(task(seed).solve().converged for seed in range(400)) >= 398
+@pytest.mark.slow
+def test_nearly_all_searches_converge(slow: bool) -> None:
+    count, failing = (400, 2) if slow else (150, 1)
+    assert sum(task(seed).solve().converged for seed in range(count)) >= count - failing
 
 
 def test_noise_free_data_are_recovered() -> None:
