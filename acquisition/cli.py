@@ -247,6 +247,19 @@ def export(
 
 
 @app.command()
+def runs(
+    folder: Annotated[
+        Path, typer.Argument(help="Folder that holds the runs. Default: runs.")
+    ] = Path("runs"),
+    json: Json = False,
+) -> None:
+    """List the runs of a folder with their state, sample and verdict."""
+    from acquisition.commands.outcomes.runs import list_runs
+
+    list_runs(folder, as_json=json)
+
+
+@app.command()
 def watch(
     folder: RunFolder,
     port: Annotated[
