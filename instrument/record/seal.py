@@ -30,7 +30,7 @@ def sealed(table: str, row: Sequence[object], version: int = SCHEMA_VERSION) -> 
     """Return a row with its seal, as it is inserted into a record of that schema version."""
     columns = tables_of(version)[table]
     stored = [_stored(c, v) for c, v in zip(columns, row, strict=True) if c is not ASSIGNED]
-    return (*row, _seal(stored))
+    return (*row, seal_of(stored))
 
 
 def damaged_rows(database: sqlite3.Connection, version: int = SCHEMA_VERSION) -> Damaged:
@@ -52,11 +52,11 @@ def _damaged(
 ) -> tuple[int, ...]:
     names = ", ".join(c.name for c in columns if c is not ASSIGNED)
     rows = database.execute(f"SELECT rowid, {SEAL.name}, {names} FROM {table} NOT INDEXED")
-    return tuple(rowid for rowid, seal, *values in rows if seal != _seal(values))
+    return tuple(rowid for rowid, seal, *values in rows if seal != seal_of(values))
 
 
-def _seal(values: Sequence[object]) -> int:
-    """Return the seal of values as SQLite returns them, texts as bytes."""
+def seal_of(values: Sequence[object]) -> int:
+    """Return the seal of a row (without what SQLite assigns) as it returns it, texts as bytes."""
     short = [zlib.crc32(v) if isinstance(v, bytes) else v for v in values]
     return zlib.crc32(repr(short).encode())
 

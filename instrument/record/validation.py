@@ -17,6 +17,7 @@ import sqlite3
 import stat
 from collections.abc import Iterator
 from contextlib import closing
+from functools import cache
 from itertools import chain
 from pathlib import Path
 
@@ -97,10 +98,16 @@ def check_schema(database: sqlite3.Connection, path: Path) -> int:
     return version
 
 
-def _compare(found: dict[str, tuple[str, object]], version: int, path: Path) -> None:
+@cache
+def _known_schema(version: int) -> dict[str, tuple[str, object]]:
+    """Return what a record of that version holds, as `_schema` does."""
     with closing(sqlite3.connect(":memory:")) as model:
         model.executescript(_KNOWN_SQL[version])
-        wanted = _schema(model)
+        return _schema(model)
+
+
+def _compare(found: dict[str, tuple[str, object]], version: int, path: Path) -> None:
+    wanted = _known_schema(version)
     for name in [n for n in found if n not in wanted or found[n] != wanted[n]]:
         kind, _ = found[name]
         raise InputError(

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from instrument.record.older_versions import OLDER_SQL
 from instrument.record.record import FILE_NAME
-from instrument.record.schema import SCHEMA_VERSION, TABLES, has_seals, tables_of
-from instrument.record.seal import sealed
+from instrument.record.schema import ASSIGNED, SCHEMA_VERSION, TABLES, has_seals, tables_of
+from instrument.record.seal import seal_of, sealed
 
 
 def as_version(run: Path, version: int) -> None:
@@ -62,9 +62,9 @@ def _seal_table(database: sqlite3.Connection, table: str) -> None:
     version = next(
         v for v in (SCHEMA_VERSION, 5) if {c.name for c in tables_of(v)[table]} <= present
     )
-    names = ", ".join(column.name for column in tables_of(version)[table])
+    names = ", ".join(c.name for c in tables_of(version)[table] if c is not ASSIGNED)
     database.text_factory = bytes  # a forged text may be no UTF-8
     rows = database.execute(f"SELECT rowid, {names} FROM {table} NOT INDEXED").fetchall()
     database.text_factory = str
-    seals = [(sealed(table, values, version)[-1], rowid) for rowid, *values in rows]
+    seals = [(seal_of(values), rowid) for rowid, *values in rows]
     database.executemany(f"UPDATE {table} SET crc32 = ? WHERE rowid = ?", seals)
