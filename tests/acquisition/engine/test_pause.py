@@ -138,7 +138,7 @@ def test_an_onlooker_in_another_thread_sees_the_scan_move_expose_and_end(
     engine = Engine(small.protocol, small.rig, open_devices(small), record, lambda _: None)
 
     def watch() -> None:
-        while not over.is_set():
+        while not over.wait(1e-4):  # a moment for the scan
             present = engine.present()
             seen.add((present.phase, bool(present.moving)))
 
