@@ -13,7 +13,7 @@ from analysis.models import MODELS
 from instrument.geometry import FloatArray
 from tests.support.command import gonio_here as gonio
 
-CASES, ALL_CASES = 24, 1500
+CASES, ALL_CASES = 15, 1500
 ANGLES_DEG = (0.0, 5.0, 30.0, 45.0, 60.0, 75.0, 89.99, 90.0)
 HEADER = "theta_i_deg,theta_r_deg,dphi_deg,brdf"
 
