@@ -232,7 +232,9 @@ def export(
     folder: RunFolder,
     format: Annotated[
         str,
-        typer.Option("--format", help="Format of the file: csv.", autocompletion=_format_names),
+        typer.Option(
+            "--format", help="Format of the file: csv, nexus.", autocompletion=_format_names
+        ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="File to write.")],
 ) -> None:

@@ -68,7 +68,7 @@ class Export:
     @property
     def sample(self) -> str:
         """Name of the sample on one line, `sample` where it has none."""
-        return " ".join(self.facts.get("sample", "").split()) or "sample"
+        return one_line(self.facts.get("sample", "")) or "sample"
 
     def require_absolute(self, name: str) -> None:
         """Raise `InputError` if the values have no absolute scale; `name`: that of the format."""
@@ -93,4 +93,9 @@ def refuse(name: str, why: str, advice: str) -> NoReturn:
 
 def fact_lines(export: Export) -> list[str]:
     """Facts as `name: text`, each on one line."""
-    return [f"{name}: {' '.join(text.split())}" for name, text in export.facts.items()]
+    return [f"{name}: {one_line(text)}" for name, text in export.facts.items()]
+
+
+def one_line(text: str) -> str:
+    """Text in one line, without characters that cannot be printed, which break most formats."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())

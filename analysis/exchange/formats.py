@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+from analysis.exchange.dense import nexus
 from analysis.exchange.exported import Export
 
 
@@ -29,5 +30,6 @@ def _own_table(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
         "csv": Format(".csv", "all that was measured, as measurements.csv", _own_table),
+        "nexus": Format(".nxs", "NeXus/HDF5, for NeXpy and h5web", nexus.files),
     }
 )

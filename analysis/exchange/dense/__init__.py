@@ -1,0 +1,1 @@
+"""Binary and dense formats of BRDF data."""

@@ -1,0 +1,118 @@
+"""NeXus files, read back by h5py and by nexusformat, the library of NeXpy."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from unittest.mock import patch
+
+import h5py
+import numpy as np
+import pytest
+from nexusformat.nexus import NXdata, nxload
+
+from analysis.exchange.dense import nexus
+from analysis.exchange.exported import Export, one_line
+from instrument.errors import InputError
+from tests.support.exchange.random_exports import KINDS, fitted, random_export
+
+MODEL = fitted("oren_nayar", albedo=0.7, sigma_deg=20)
+
+
+def _written(export: Export, folder: Path) -> Path:
+    ((name, content),) = nexus.files(export, "mine")
+    (folder / name).write_bytes(content)
+    return folder / name
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(4))
+def test_every_value_is_read_back_as_measured(seed: int, kind: str, tmp_path: Path) -> None:
+    export = random_export(seed, kind, MODEL if seed % 2 else None)
+    table = export.table
+    with h5py.File(_written(export, tmp_path)) as file:
+        points = file["entry/points"]
+        assert np.array_equal(points["brdf"][()], table.brdf)
+        for name in ("theta_i", "theta_r", "dphi"):
+            assert np.array_equal(points[name][()], getattr(table.geometry, f"{name}_deg"))
+        has_u = not np.all(np.isnan(table.u_brdf))
+        assert ("brdf_errors" in points) == has_u
+        if has_u:
+            assert np.array_equal(points["brdf_errors"][()], table.u_brdf, equal_nan=True)
+        assert points["brdf"].attrs["units"] == ("arbitrary" if table.relative else "1/sr")
+        assert points["brdf"].attrs["origin"] == "measured"
+        instrument = file["entry/instrument"]
+        solid_angles = {"source": table.source_sr, "detector": table.receiver_sr}
+        for part, solid_angle in solid_angles.items():
+            stored = instrument[part].get("solid_angle")
+            assert (None if stored is None else stored[()]) == solid_angle
+        for name, text in export.facts.items():
+            assert file["entry/facts"][name][()].decode() == one_line(text)
+        if export.model is None:
+            assert "modelled_brdf" not in points
+            assert "model" not in file["entry"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nexpy_plots_the_default_with_axis_errors_and_the_models_curve(
+    kind: str, tmp_path: Path
+) -> None:
+    """They follow default attributes to an NXdata with signal, axes and errors."""
+    export = random_export(1, kind, MODEL)
+    root = nxload(str(_written(export, tmp_path)))
+    shown = root.plottable_data
+    assert isinstance(shown, NXdata)
+    assert shown.nxsignal.nxname == "brdf"
+    assert np.atleast_1d(shown.attrs["auxiliary_signals"]).tolist() == ["modelled_brdf"]
+    assert shown["modelled_brdf"].attrs["origin"] == "modelled"
+    assert np.all(np.diff(np.atleast_1d(shown.nxaxes[0].nxvalue)) >= 0)
+    assert shown.nxsignal.shape == shown.nxaxes[0].shape
+    assert shown.nxerrors is not None
+
+
+def test_a_sweep_has_the_signed_view_angle_as_axis(tmp_path: Path) -> None:
+    export = random_export(2, "several incidences", MODEL)
+    geometry = export.table.geometry
+    with h5py.File(_written(export, tmp_path)) as file:
+        sweeps = [group for name, group in file["entry"].items() if name.startswith("sweep")]
+        assert len(sweeps) == 3
+        assert sum(sweep["brdf"].size for sweep in sweeps) == export.table.size
+        for sweep in sweeps:
+            sign = np.where(sweep["dphi"][()] < 180, 1, -1)
+            assert np.array_equal(sweep["theta_r_signed"][()], sign * sweep["theta_r"][()])
+            assert len(set(sweep["theta_i"][()])) == 1
+            assert set(sweep["theta_i"][()]) <= set(geometry.theta_i_deg)
+
+
+def test_the_modelled_curve_is_that_of_the_model(tmp_path: Path) -> None:
+    export = random_export(1, "out of plane", MODEL)
+    with h5py.File(_written(export, tmp_path)) as file:
+        expected = MODEL.brdf(export.table.geometry)
+        assert np.array_equal(file["entry/points/modelled_brdf"][()], expected)
+        parameters = file["entry/model"]
+        assert parameters["albedo"][()] == 0.7
+        assert parameters["sigma_deg"].attrs["units"] == "degrees"
+        assert parameters["albedo_errors"][()] == 0.01
+        assert np.isnan(parameters["sigma_deg_errors"][()])
+        assert parameters["verdict"][()].decode() == "adequate"
+
+
+def test_the_curve_of_relative_values_lies_at_their_level(tmp_path: Path) -> None:
+    """Each incidence has a lamp level of its own; the curve says that only its shape counts."""
+    export = random_export(3, "several incidences", MODEL)
+    geometry = export.table.geometry
+    level = 100 + geometry.theta_i_deg
+    table = replace(export.table, brdf=level * MODEL.brdf(geometry), relative=True)
+    with h5py.File(_written(replace(export, table=table), tmp_path)) as file:
+        curve = file["entry/points/modelled_brdf"]
+        assert np.allclose(curve[()], table.brdf, rtol=1e-12)
+        assert "the shape alone counts" in curve.attrs["note"]
+
+
+def test_without_the_library_the_command_says_what_to_install() -> None:
+    with (
+        patch.dict(sys.modules, {"h5py": None}),
+        pytest.raises(InputError, match=r"gonio\[nexus\]"),
+    ):
+        list(nexus.files(random_export(0, "one point"), "mine"))
