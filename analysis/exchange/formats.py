@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from analysis.exchange.dense import nexus
 from analysis.exchange.exported import Export
+from analysis.exchange.tables import astm
 
 
 class Format(NamedTuple):
@@ -31,5 +32,6 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
     {
         "csv": Format(".csv", "all that was measured, as measurements.csv", _own_table),
         "nexus": Format(".nxs", "NeXus/HDF5, for NeXpy and h5web", nexus.files),
+        "astm": Format(".astm", "ASTM E1392 text, for libbsdf and others", astm.files),
     }
 )
