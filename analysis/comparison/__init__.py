@@ -1,0 +1,1 @@
+"""Comparison of several runs: whether they agree, and how far they repeat."""
