@@ -6,6 +6,9 @@ BIN := $(VENV)/bin
 # Six workers need not each read the files that have no such test.
 WAITING = $(shell grep -rl --include='test_*.py' 'pytest\.mark\.waits' tests)
 
+# A hundred processes start in a test run: without its bytecode each compiles the project anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test hil-emulated lint waiting clean
 
 demo: $(VENV)/.installed

@@ -16,8 +16,9 @@ from typing import Annotated
 import typer
 
 from acquisition.calibrate_cli import calibrate
-from acquisition.cli_parts import Commands, Json, RigOnly
+from acquisition.cli_parts import Commands, Json, RigOnly, RunFolder
 from acquisition.new_cli import new
+from acquisition.outcomes_cli import compare, export, runs
 from acquisition.terminal import stop_signals
 from acquisition.terminal.streams import lasting_streams
 from instrument.errors import InputError, StorageError
@@ -51,18 +52,10 @@ def _model_names(incomplete: str) -> list[str]:
     return completed_names(incomplete)
 
 
-def _format_names(incomplete: str) -> list[str]:
-    """Completion in the shell of formats of files."""
-    from analysis.exchange.formats import FORMATS
-
-    return _among(tuple(FORMATS))(incomplete)
-
-
 ProtocolFile = Annotated[Path, typer.Argument(help="The protocol, a YAML file.")]
 RigFile = Annotated[
     Path | None, typer.Option("--rig", help="A rig file in place of the one the protocol names.")
 ]
-RunFolder = Annotated[Path, typer.Argument(help="The folder of a run.")]
 OutFolder = Annotated[
     Path | None,
     typer.Option(
@@ -227,38 +220,8 @@ def report(folder: RunFolder, json: Json = False) -> None:
     report_run(folder, as_json=json)
 
 
-@app.command()
-def export(
-    folder: RunFolder,
-    format: Annotated[
-        str,
-        typer.Option(
-            "--format", help="Format of the file: csv, astm, nexus.", autocompletion=_format_names
-        ),
-    ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="File to write.")],
-) -> None:
-    """Write a run in the format of another program; points with a flag are left out.
-
-    What is interpolated or modelled is marked as such. No file is written where the format cannot
-    hold the run.
-    """
-    from acquisition.commands.outcomes.export import export_run
-
-    export_run(folder, format, output)
-
-
-@app.command()
-def runs(
-    folder: Annotated[
-        Path, typer.Argument(help="Folder that holds the runs. Default: runs.")
-    ] = Path("runs"),
-    json: Json = False,
-) -> None:
-    """List the runs of a folder with their state, sample and verdict."""
-    from acquisition.commands.outcomes.runs import list_runs
-
-    list_runs(folder, as_json=json)
+for command in (export, compare, runs):
+    app.command()(command)
 
 
 @app.command()

@@ -23,6 +23,8 @@ Json = Annotated[
     bool, typer.Option("--json", help="Print only the result, as JSON, on standard output.")
 ]
 
+RunFolder = Annotated[Path, typer.Argument(help="The folder of a run.")]
+
 RigOnly = Annotated[Path | None, typer.Option("--rig", help="The rig file.")]
 
 

@@ -18,7 +18,7 @@ from analysis.data.csv_table import CsvTable, read_table
 from analysis.data.curet import read_curet
 from analysis.data.measurements import Measurements, SharedError
 from analysis.data.repeats import Repeats, mean_of_repeats
-from instrument.config.protocol import FitConfig
+from instrument.config.protocol import FitConfig, WhiteTile
 from instrument.errors import AllFlagged, InputError, NoMeasurement, NotDetermined
 from instrument.record.record import FILE_NAME, Record
 from instrument.text.quoting import printable
@@ -31,13 +31,16 @@ FORMATS = ("auto", "run", "csv", "curet")
 class Source:
     """Measurements, the rig's acceptance if it is known, and remarks: points left out, assumptions.
 
-    fit: the models and the method that a run's protocol names.
+    fit: the models and the method that a run's protocol names. sample, tile: name of a run's sample
+    and its white tile, empty and None where they are not known.
     """
 
     measurements: Measurements
     acceptance: Acceptance | None
     notes: tuple[Note, ...]
     fit: FitConfig = field(default_factory=FitConfig)
+    sample: str = ""
+    tile: WhiteTile | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,7 +132,9 @@ def _run(path: Path) -> Source:
         found = measurements(reduced, loaded)
     except ValueError as error:  # values outside their domain, such as a u of 0
         raise NotDetermined(str(error)) from None
-    return Source(found, acceptance, notes, loaded.protocol.fit)
+    protocol = loaded.protocol
+    tile = protocol.references.white_tile
+    return Source(found, acceptance, notes, protocol.fit, protocol.sample.name, tile)
 
 
 def _csv(path: Path, wanted: Wanted) -> Source:

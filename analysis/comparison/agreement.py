@@ -105,7 +105,7 @@ def agreement(runs: Sequence[Values], same: Collection[str] = ()) -> Agreement:
 
 
 def joint_columns(covariances: Sequence[Covariance], same: Collection[str]) -> FloatArray:
-    """Return the shared errors of all K runs together, (K G, M), shifts in 1/sr by one u.
+    """Return the shared errors of all K runs together, shape (K G, M), in 1/sr by one u.
 
     A run's own error shifts its own points alone. Errors named in `same` are one column.
     """

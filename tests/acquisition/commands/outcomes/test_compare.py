@@ -1,0 +1,103 @@
+"""`gonio compare`: days of one sample agree, another sample does not, wrong sources are named."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.support.command import gonio_here as gonio
+from tests.support.scans import small_demo
+
+TILE = re.compile(r"white_tile: .*")
+EXACT_TILE = "white_tile: {reflectance: 0.99, u_reflectance: 0.0, theta_r_deg: 10.0}"
+
+
+def measured(folder: Path, seed: int, **changes: str) -> Path:
+    """Run of a day: of the tile, whose true value a seed draws, nothing is uncertain here."""
+    folder.mkdir()
+    protocol = small_demo(folder)
+    rig = folder / "small_rig.yaml"
+    rig.write_text(re.sub(r"seed: \d+", f"seed: {seed}", rig.read_text()))
+    text = TILE.sub(EXACT_TILE, protocol.read_text()).replace("mottling: 0.02", "mottling: 0.0")
+    for old, new in changes.items():
+        text = re.sub(rf"{old}: [\d.]+", f"{old}: {new}", text)
+    protocol.write_text(text)
+    done = gonio("run", protocol, "--out", folder / "run")
+    assert done.returncode == 0, done.stderr
+    return folder / "run"
+
+
+@pytest.fixture(scope="module")
+def days(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("days")
+    return [measured(folder / f"day{seed}", seed) for seed in (1, 2)]
+
+
+def test_days_of_one_sample_agree(days: list[Path]) -> None:
+    done = gonio("compare", *days, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["agree"]
+    assert found["agree_in_shape"]
+    assert found["same_white_tile"]
+    assert found["dof"] == len(found["geometries"]["theta_r_deg"])
+    for run in found["runs"][1:]:
+        assert abs(run["level"] - 1) < 4 * run["u_level"]
+        assert run["u_level"] < 0.002
+
+
+def test_another_sample_is_told_by_its_level(days: list[Path], tmp_path: Path) -> None:
+    other = measured(tmp_path / "other", 4, albedo="0.78", ks="0.074")
+    done = gonio("compare", days[0], other, "--json")
+    found = json.loads(done.stdout)
+    assert not found["agree"]
+    assert found["runs"][1]["level"] == pytest.approx(0.975, abs=0.003)
+
+
+def test_text_and_page_say_what_was_found(days: list[Path], tmp_path: Path) -> None:
+    page = tmp_path / "days.html"
+    done = gonio("compare", *days, "--out", page)
+    assert done.returncode == 0, done.stderr
+    assert "agree within their uncertainty" in done.stdout
+    assert "its certificate cancel" in " ".join(done.stdout.split())
+    html = page.read_text()
+    assert "agree within their uncertainty" in html
+    assert html.count("<svg") == 1
+    assert "<script" not in html
+
+
+def test_a_run_and_its_table_are_the_same(days: list[Path]) -> None:
+    done = gonio("compare", days[0], days[0] / "measurements.csv", "--json")
+    found = json.loads(done.stdout)
+    assert found["chi2"] == pytest.approx(0, abs=1e-6)
+    assert found["repeatability"]["scatter_relative"] == 0
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("theta_i_deg,theta_r_deg,dphi_deg,brdf\n30,0,0,.2\n30,20,0,.2\n", "states no uncertainty"),
+        (
+            "theta_i_deg,theta_r_deg,dphi_deg,brdf,u_brdf\n31,1,0,.2,.01\n31,21,0,.2,.01\n",
+            "no geometry is common",
+        ),
+    ],
+)
+def test_sources_that_cannot_be_compared_are_refused(
+    days: list[Path], tmp_path: Path, table: str, words: str
+) -> None:
+    (tmp_path / "table.csv").write_text(table)
+    done = gonio("compare", days[0], tmp_path / "table.csv", "--out", tmp_path / "page.html")
+    assert done.returncode == 2
+    assert words in " ".join(done.stderr.split())
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_one_run_or_one_named_twice_is_refused(days: list[Path]) -> None:
+    for sources in (days[:1], [days[0], days[0]]):
+        done = gonio("compare", *sources)
+        assert done.returncode == 2
+        assert "gonio compare" in done.stderr
