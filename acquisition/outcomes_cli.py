@@ -22,7 +22,9 @@ def export(
     format: Annotated[
         str,
         typer.Option(
-            "--format", help="Format of the file: csv, astm, nexus.", autocompletion=_format_names
+            "--format",
+            help="Format of the file: csv, astm, pab, nexus.",
+            autocompletion=_format_names,
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="File to write.")],
