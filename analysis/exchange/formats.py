@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from analysis.exchange.dense import nexus
 from analysis.exchange.exported import Export
-from analysis.exchange.tables import astm, pab
+from analysis.exchange.tables import alta, astm, pab
 
 
 class Format(NamedTuple):
@@ -34,5 +34,6 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         "nexus": Format(".nxs", "NeXus/HDF5, for NeXpy and h5web", nexus.files),
         "astm": Format(".astm", "ASTM E1392 text, for libbsdf and others", astm.files),
         "pab": Format(".pab", "pab-opto text, for pabopto2bsdf of Radiance", pab.files),
+        "alta": Format(".alta", "ALTA text with error bars, for fits by ALTA", alta.files),
     }
 )
