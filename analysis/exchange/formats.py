@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from analysis.exchange.dense import nexus, zemax
+from analysis.exchange.dense import merl, nexus, zemax
 from analysis.exchange.exported import Export
 from analysis.exchange.tables import alta, astm, pab
 
@@ -32,6 +32,7 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
     {
         "csv": Format(".csv", "all that was measured, as measurements.csv", _own_table),
         "nexus": Format(".nxs", "NeXus/HDF5, for NeXpy and h5web", nexus.files),
+        "merl": Format(".binary", "the model on the MERL grid, for renderers", merl.files),
         "astm": Format(".astm", "ASTM E1392 text, for libbsdf and others", astm.files),
         "zemax": Format(".bsdf", "Zemax tabular BSDF, for OpticStudio", zemax.files),
         "pab": Format(".pab", "pab-opto text, for pabopto2bsdf of Radiance", pab.files),

@@ -13,7 +13,8 @@ import pytest
 from analysis.exchange.dense import nexus
 from analysis.exchange.exported import Export, one_line
 from instrument.errors import InputError
-from tests.support.exchange.random_exports import KINDS, fitted, random_export
+from tests.support.exchange.fitted_models import explained_by, fitted
+from tests.support.exchange.random_tables import KINDS, random_export, relative
 
 h5py = pytest.importorskip("h5py", reason="the library of NeXus files is not installed")
 nexpy = pytest.importorskip("nexusformat.nexus", reason="the library of NeXpy is not installed")
@@ -27,10 +28,16 @@ def _written(export: Export, folder: Path) -> Path:
     return folder / name
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", range(4))
-def test_every_value_is_read_back_as_measured(seed: int, kind: str, tmp_path: Path) -> None:
-    export = random_export(seed, kind, MODEL if seed % 2 else None)
+def _random(seed: int) -> Export:
+    """Export of one of all kinds of tables, with and without a model and an absolute scale."""
+    export = random_export(seed)
+    export = replace(export, model=MODEL if seed // len(KINDS) % 2 else None)
+    return relative(export) if seed % 3 == 0 else export
+
+
+@pytest.mark.parametrize("seed", range(4 * len(KINDS)))
+def test_every_value_is_read_back_as_measured(seed: int, tmp_path: Path) -> None:
+    export = _random(seed)
     table = export.table
     with h5py.File(_written(export, tmp_path)) as file:
         points = file["entry/points"]
@@ -55,12 +62,12 @@ def test_every_value_is_read_back_as_measured(seed: int, kind: str, tmp_path: Pa
             assert "model" not in file["entry"]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(2 * len(KINDS)))
 def test_nexpy_plots_the_default_with_axis_errors_and_the_models_curve(
-    kind: str, tmp_path: Path
+    seed: int, tmp_path: Path
 ) -> None:
     """They follow default attributes to an NXdata with signal, axes and errors."""
-    export = random_export(1, kind, MODEL)
+    export = replace(_random(seed), model=MODEL)
     root = nexpy.nxload(str(_written(export, tmp_path)))
     shown = root.plottable_data
     assert isinstance(shown, nexpy.NXdata)
@@ -73,11 +80,11 @@ def test_nexpy_plots_the_default_with_axis_errors_and_the_models_curve(
 
 
 def test_a_sweep_has_the_signed_view_angle_as_axis(tmp_path: Path) -> None:
-    export = random_export(2, "several incidences", MODEL)
+    export = random_export(KINDS.index("whole sweeps"))
     geometry = export.table.geometry
     with h5py.File(_written(export, tmp_path)) as file:
         sweeps = [group for name, group in file["entry"].items() if name.startswith("sweep")]
-        assert len(sweeps) == 3
+        assert len(sweeps) == len(set(geometry.theta_i_deg)) > 1
         assert sum(sweep["brdf"].size for sweep in sweeps) == export.table.size
         for sweep in sweeps:
             sign = np.where(sweep["dphi"][()] < 180, 1, -1)
@@ -87,7 +94,7 @@ def test_a_sweep_has_the_signed_view_angle_as_axis(tmp_path: Path) -> None:
 
 
 def test_the_modelled_curve_is_that_of_the_model(tmp_path: Path) -> None:
-    export = random_export(1, "out of plane", MODEL)
+    export = replace(random_export(KINDS.index("out of plane")), model=MODEL)
     with h5py.File(_written(export, tmp_path)) as file:
         expected = MODEL.brdf(export.table.geometry)
         assert np.array_equal(file["entry/points/modelled_brdf"][()], expected)
@@ -101,14 +108,22 @@ def test_the_modelled_curve_is_that_of_the_model(tmp_path: Path) -> None:
 
 def test_the_curve_of_relative_values_lies_at_their_level(tmp_path: Path) -> None:
     """Each incidence has a lamp level of its own; the curve says that only its shape counts."""
-    export = random_export(3, "several incidences", MODEL)
-    geometry = export.table.geometry
-    level = 100 + geometry.theta_i_deg
-    table = replace(export.table, brdf=level * MODEL.brdf(geometry), relative=True)
+    export = relative(explained_by(MODEL, random_export(KINDS.index("whole sweeps"))))
+    level = 100 + export.table.geometry.theta_i_deg
+    table = replace(export.table, brdf=level * export.table.brdf)
     with h5py.File(_written(replace(export, table=table), tmp_path)) as file:
         curve = file["entry/points/modelled_brdf"]
         assert np.allclose(curve[()], table.brdf, rtol=1e-12)
         assert "the shape alone counts" in curve.attrs["note"]
+
+
+def test_sample_and_times_stand_where_nexus_has_a_place_for_them(tmp_path: Path) -> None:
+    facts = {"sample": "a\nplate", "measured_utc": "2026-11-20T10:00:00Z to 2026-11-20T10:30:00Z"}
+    with h5py.File(_written(replace(random_export(0), facts=facts), tmp_path)) as file:
+        entry = file["entry"]
+        assert entry["start_time"][()].decode() == "2026-11-20T10:00:00Z"
+        assert entry["end_time"][()].decode() == "2026-11-20T10:30:00Z"
+        assert entry["title"][()] == entry["sample/name"][()] == b"a plate"
 
 
 def test_without_the_library_the_command_says_what_to_install() -> None:
@@ -116,4 +131,4 @@ def test_without_the_library_the_command_says_what_to_install() -> None:
         patch.dict(sys.modules, {"h5py": None}),
         pytest.raises(InputError, match=r"gonio\[nexus\]"),
     ):
-        list(nexus.files(random_export(0, "one point"), "mine"))
+        list(nexus.files(random_export(0), "mine"))
