@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acquisition.terminal.console import EscapingConsole
 from analysis.models import MODELS
 from instrument.geometry import Geometry
 from tests.support.command import gonio_here as gonio
@@ -76,7 +77,7 @@ def test_a_person_reads_parameters_candidates_and_why(rough: Path) -> None:
 
 def test_a_narrow_terminal_cuts_no_number(rough: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def printed(columns: int) -> str:
-        monkeypatch.setenv("COLUMNS", str(columns))
+        monkeypatch.setattr(EscapingConsole, "width", columns)
         models = "lambert,lambert+torrance_sparrow,oren_nayar"
         return gonio("fit", rough, "--models", models).stdout
 

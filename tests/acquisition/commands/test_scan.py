@@ -15,10 +15,12 @@ from typing import Any
 import pytest
 
 from acquisition.commands import scan
+from acquisition.terminal import stop_signals
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import TWO_MODELS, small_demo
+from tests.support.timing.deadline import wait_for
 
 METADATA = "{sample_id: F-17, operator: Jürgen, wavelength_nm: 550, notes: 'two, \"three\"'}"
 
@@ -57,6 +59,7 @@ def stopped(small: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         add_reading(record, reading, *more, **named)
         if reading.step == 5:
             os.kill(os.getpid(), signal.SIGINT)
+            wait_for(lambda: stop_signals.reason() != "", "the signal")
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(Record, "add_reading", stop_after_some)

@@ -112,5 +112,5 @@ def test_two_clients_one_of_them_stalled_and_a_browser_cost_a_scan_no_time(
     folders = [tmp_path / f"{n}" for n in range(5 if slow else 1)]
     pairs = [time_a_pair_s(folder, protocol, with_browser=slow) for folder in folders]
     alone_s, watched_s = np.median(pairs, axis=0)
-    record_property("time of a point, watched / alone", watched_s / alone_s)
+    record_property("time of a point, watched / alone", float(watched_s / alone_s))
     assert watched_s / alone_s < (MOST if slow else MOST_OF_ONE), pairs

@@ -1,10 +1,8 @@
-"""A scan in real time in the browser: watched, paused, resumed and aborted.
-
-That a run which was aborted from outside resumes is tested in `test_watched_scan`.
-"""
+"""A scan in real time in the browser: watched, paused, resumed, aborted, and resumed again."""
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import sqlite3
@@ -13,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from instrument.record.record import Record
+from tests.support.command import gonio
 from tests.support.live.chromium import Windows, missing
 from tests.support.live.live_scan import live_command
 from tests.support.paths import CONFIGS
@@ -92,6 +92,11 @@ def test_a_scan_is_paused_resumed_and_aborted_on_the_page(
         second.close()
     windows.complaints = [c for c in windows.complaints if "ERR_" not in c]  # the page has ended
     assert paused_at < readings(run) < 17
+    done = gonio("resume", run, "--yes", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["verdict"] == "adequate"
+    with Record.open(run) as record:
+        assert sum(r.kind == "point" for r in record.rows().readings) == 17
 
 
 def test_the_lens_is_aimed_with_the_emulated_camera(
