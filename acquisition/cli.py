@@ -143,8 +143,9 @@ def fit(
     format: Annotated[
         str,
         typer.Option(
-            help="run, csv or curet; auto: a run if SOURCE is a folder, else csv.",
-            autocompletion=_among(("auto", "run", "csv", "curet")),
+            help="run, csv, astm, zemax, pab, alta or curet; auto: a run if SOURCE is a folder, "
+            "else a table by its content.",
+            autocompletion=_among(("auto", "run", "csv", "astm", "zemax", "pab", "alta", "curet")),
         ),
     ] = "auto",
     sample: Annotated[int | None, typer.Option(help="Number of the material, for curet.")] = None,
@@ -158,7 +159,7 @@ def fit(
     u_shared: Annotated[
         str | None,
         typer.Option(
-            help="Relative u of an error that all values share (0.5% or 0.005), for csv and curet."
+            help="Relative u of an error that all values share (0.5% or 0.005), for tables."
         ),
     ] = None,
     repeats: Annotated[
@@ -176,9 +177,10 @@ def fit(
     ] = "auto",
     json: Json = False,
 ) -> None:
-    """Find the simplest model that explains a run or a CSV table of BRDF.
+    """Find the simplest model that explains a run or a table of BRDF.
 
     A CSV table has the columns theta_i_deg, theta_r_deg, dphi_deg, brdf and, if known, u_brdf.
+    Tables in the text formats of `gonio export` are read too.
     Exits with 0 whether or not a model is adequate, with 5 if the data do not determine the
     parameters.
     """

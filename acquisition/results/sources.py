@@ -1,4 +1,4 @@
-"""Sources of `gonio fit`: a run's folder, a CSV table, a folder of the CUReT database."""
+"""Sources of `gonio fit`: runs, tables of this and of other programs, the CUReT database."""
 
 from __future__ import annotations
 
@@ -14,17 +14,19 @@ from acquisition.results.reduction import reduced_run, require_usable
 from acquisition.results.run_folder import load_run_inputs
 from analysis.choice.notes import Note, NoteCode
 from analysis.data.acceptance import Acceptance
-from analysis.data.csv_table import CsvTable, read_table
+from analysis.data.csv_table import CsvTable, table_of
 from analysis.data.curet import read_curet
 from analysis.data.measurements import Measurements, SharedError
 from analysis.data.repeats import Repeats, mean_of_repeats
+from analysis.exchange.imports import READERS, kind_of, read_foreign
 from instrument.config.protocol import FitConfig, WhiteTile
 from instrument.errors import AllFlagged, InputError, NoMeasurement, NotDetermined
 from instrument.record.record import FILE_NAME, Record
 from instrument.text.quoting import printable
+from instrument.text.text_file import TextFile, read_text
 
 _U_NAME = re.compile(r"(u|unc|uncertainty|err|error|std|sd|sigma|stdev|σ)(\b|_)", re.IGNORECASE)
-FORMATS = ("auto", "run", "csv", "curet")
+FORMATS = ("auto", "run", "csv", "curet", *READERS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +79,12 @@ def read_source(path: Path, wanted: Wanted) -> Source:
     if wanted.u_shared is not None and kind == "run":
         raise InputError(
             f"--u-shared: {wanted.u_shared:g} for a run, which states its own shared errors; "
-            "allowed for the formats csv and curet"
+            "allowed for tables"
         )
     if kind == "curet":
         source = _curet(path, wanted)
     else:
-        source = _run(path) if kind == "run" else _csv(path, wanted)
+        source = _run(path) if kind == "run" else _table(path, kind, wanted)
         source = _cut(source, wanted.max_theta_deg)
     if wanted.relative:
         source = replace(source, measurements=replace(source.measurements, relative=True))
@@ -137,17 +139,27 @@ def _run(path: Path) -> Source:
     return Source(found, acceptance, notes, protocol.fit, protocol.sample.name, tile)
 
 
-def _csv(path: Path, wanted: Wanted) -> Source:
-    table = read_table(path, repeats=wanted.repeats is not None)
+def _table(path: Path, kind: str, wanted: Wanted) -> Source:
+    """Read a table; without a format asked for, its content tells which one it is."""
+    file = read_text(path, pipe=True)
+    found = kind_of(file) or kind if wanted.format == "auto" else kind
+    return _csv(file, wanted) if found == "csv" else _foreign(file, found, wanted)
+
+
+def _csv(file: TextFile, wanted: Wanted) -> Source:
+    table = table_of(file, repeats=wanted.repeats is not None)
     m = table.measurements
     if not m.size:
         raise AllFlagged(f"all {table.flagged} points are flagged: there is nothing to fit")
     notes = _flagged(table.flagged, table.flagged + m.size) + _ignored_u(table)
-    if wanted.repeats is not None:
-        m, repeats = mean_of_repeats(m)
-        notes += _averaged(repeats, m)
-    source = Source(m, table.acceptance, notes)
+    source = _averaged(Source(m, table.acceptance, notes), wanted)
     return _with_assumptions(source, wanted, states_shared=table.states_shared)
+
+
+def _foreign(file: TextFile, kind: str, wanted: Wanted) -> Source:
+    m = read_foreign(file, kind, repeats=wanted.repeats is not None)
+    source = _averaged(Source(m, None, ()), wanted)
+    return _with_assumptions(source, wanted, states_shared=False)
 
 
 def _flagged(flagged: int, points: int) -> tuple[Note, ...]:
@@ -167,7 +179,15 @@ def _ignored_u(table: CsvTable) -> tuple[Note, ...]:
     return (Note(NoteCode.IGNORED_U, text),)
 
 
-def _averaged(repeats: Repeats, m: Measurements) -> tuple[Note, ...]:
+def _averaged(source: Source, wanted: Wanted) -> Source:
+    """Average rows of the same geometry, where that is wanted."""
+    if wanted.repeats is None:
+        return source
+    m, repeats = mean_of_repeats(source.measurements)
+    return replace(source, measurements=m, notes=source.notes + _repeats(repeats, m))
+
+
+def _repeats(repeats: Repeats, m: Measurements) -> tuple[Note, ...]:
     if not repeats.geometries:
         return ()
     text = f"{repeats.geometries} of {m.size} geometries are means of {repeats.rows} repeats, which"

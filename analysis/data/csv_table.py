@@ -55,6 +55,11 @@ def read_csv(path: Path) -> Measurements:
 
 
 def read_table(path: Path, *, repeats: bool = False) -> CsvTable:
+    """Read a file as `table_of` does."""
+    return table_of(read_text(path, pipe=True), repeats=repeats)
+
+
+def table_of(file: TextFile, *, repeats: bool = False) -> CsvTable:
     """Read a table; `u_random` is None if no u is stated, or u_brdf is empty in every row.
 
     A row with the same three angles as an earlier one is a mistake, unless `repeats` allows it.
@@ -63,7 +68,6 @@ def read_table(path: Path, *, repeats: bool = False) -> CsvTable:
     every row, radiance over cos(theta_i) is read, relative to a level of each lamp setting.
     Raises `InputError` with every mistake in the file; three of a kind are listed.
     """
-    file = read_text(path, pipe=True)
     rows = file.rows()
     table = _Table(file, read_header(file, rows), repeats)
     for line, text in rows:

@@ -28,7 +28,15 @@ import numpy as np
 from analysis.data.csv_columns import BRDF
 from analysis.exchange.exported import BrdfTable, Export
 from analysis.exchange.tables.header import exact, stated
-from analysis.exchange.tables.rows import PHI_RAD, THETA_R_RAD, Row, parsed, table, words
+from analysis.exchange.tables.rows import (
+    PHI_RAD,
+    THETA_R_RAD,
+    Row,
+    in_degrees,
+    parsed,
+    table,
+    words,
+)
 from instrument.text.csv_column import Column
 from instrument.text.quoting import shown
 from instrument.text.text_file import TextFile
@@ -146,8 +154,8 @@ def _angles(found: list[float]) -> tuple[float, float, float]:
         view, light, dphi = found[0], found[1], -found[2]
     else:
         light, view, dphi = found[0], found[2], found[3] - found[1]
-    turned = math.degrees(dphi) + (180 if light < 0 else 0)
-    return math.degrees(view), math.degrees(abs(light)), turned
+    turned = in_degrees(dphi) + (180 if light < 0 else 0)
+    return in_degrees(view), in_degrees(abs(light)), turned
 
 
 def _radius(bounds: list[float]) -> float:

@@ -32,6 +32,7 @@ from analysis.exchange.tables.rows import (
     THETA_R_RAD,
     Row,
     fields,
+    in_degrees,
     parsed,
     table,
 )
@@ -124,8 +125,8 @@ def _row(file: TextFile, line: int, text: str, order: list[int]) -> Row | None:
     theta_i, phi_i, theta_s, phi_s, brdf = (
         parsed(file, line, column, found[n]) for column, n in zip(columns, order, strict=True)
     )
-    dphi = math.degrees(phi_s - phi_i)
-    return math.degrees(theta_i), math.degrees(theta_s), dphi, brdf, math.nan
+    dphi = in_degrees(phi_s - phi_i)
+    return in_degrees(theta_i), in_degrees(theta_s), dphi, brdf, math.nan
 
 
 def _check_count(file: TextFile, number: int, rows: int) -> None:

@@ -45,6 +45,11 @@ def parsed(file: TextFile, line: int, column: Column, field: tuple[int, str]) ->
         return math.nan
 
 
+def in_degrees(angle_rad: float) -> float:
+    """Angle in degrees; 30 degrees stay 30 after a way through radians."""
+    return round(math.degrees(angle_rad), 9)
+
+
 def table(file: TextFile, rows: Sequence[Row], what: str) -> BrdfTable:
     """Table of rows (theta_i, theta_r, dphi in degrees, BRDF and its u in 1/sr, NaN: not known).
 

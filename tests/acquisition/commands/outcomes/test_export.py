@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from acquisition.results.sources import Wanted, read_source
 from analysis.exchange.formats import FORMATS
+from analysis.exchange.imports import READERS
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import small_demo
 
@@ -24,6 +27,22 @@ def test_csv_is_the_table_of_the_run(run: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == [str(tmp_path / "mine.csv")]
     assert (tmp_path / "mine.csv").read_bytes() == (run / "measurements.csv").read_bytes()
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_table_for_another_program_holds_the_run_and_can_be_fitted(
+    run: Path, tmp_path: Path, name: str
+) -> None:
+    path = tmp_path / f"mine{FORMATS[name].suffix}"
+    done = gonio("export", run, "--format", name, "-o", path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split()[0] == str(path)
+    assert all(Path(line).is_file() for line in done.stdout.split())
+    theirs = read_source(path, Wanted()).measurements
+    ours = read_source(run, Wanted()).measurements
+    assert set(theirs.brdf) <= set(ours.brdf)
+    assert theirs.size == np.sum(np.isin(ours.theta_i_deg, theirs.theta_i_deg))
+    assert gonio("fit", path, "--models", "lambert").returncode == 0
 
 
 @pytest.mark.parametrize(
