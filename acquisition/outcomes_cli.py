@@ -23,7 +23,7 @@ def export(
         str,
         typer.Option(
             "--format",
-            help="Format of the file: csv, astm, zemax, pab, alta, nexus, merl.",
+            help="Format of the file: csv, astm, zemax, pab, alta, nexus, merl, mitsuba.",
             autocompletion=_format_names,
         ),
     ],

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from analysis.exchange.dense import merl, nexus, zemax
 from analysis.exchange.exported import Export
+from analysis.exchange.materials import mitsuba
 from analysis.exchange.tables import alta, astm, pab
 
 
@@ -37,5 +38,6 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         "zemax": Format(".bsdf", "Zemax tabular BSDF, for OpticStudio", zemax.files),
         "pab": Format(".pab", "pab-opto text, for pabopto2bsdf of Radiance", pab.files),
         "alta": Format(".alta", "ALTA text with error bars, for fits by ALTA", alta.files),
+        "mitsuba": Format(".xml", "material of Mitsuba 3: the model", mitsuba.files),
     }
 )

@@ -102,6 +102,23 @@ def beyond_measured(table: BrdfTable, geometry: Geometry) -> BoolArray:
     )
 
 
+def near_and_off_mirror() -> Geometry:
+    """Geometry (2000,) in degrees to compare a table with its model: half of it near a mirror's.
+
+    Nearness from 0.01 to 10 degrees, each order of magnitude as often.
+    """
+    rng = np.random.default_rng(20)
+    theta_i, theta_r = rng.uniform(0, 70, (2, 1000))
+    dphi = rng.uniform(0, 360, 1000)
+    off, turned = 10 ** rng.uniform(-2, 1, (2, 1000)) * rng.choice([-1, 1], (2, 1000))
+    near = np.abs(np.clip(theta_i + off, -70, 70))
+    return Geometry.from_degrees(
+        theta_i=np.concatenate([theta_i, theta_i]),
+        theta_r=np.concatenate([theta_r, near]),
+        dphi=np.concatenate([dphi, 180 + turned]),
+    )
+
+
 def _anisotropic_pair(table: BrdfTable) -> tuple[int, int] | None:
     """Two points at mirrored azimuths that differ by more than their u allows."""
     g = table.geometry

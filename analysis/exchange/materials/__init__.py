@@ -1,0 +1,1 @@
+"""Materials of renderers: the model that was fitted, or a table of it."""
