@@ -168,6 +168,14 @@ def fit(
             help="mean: average rows of the same geometry, weighted by 1/u². Default: refuse them."
         ),
     ] = None,
+    cosine_corrected: Annotated[
+        bool,
+        typer.Option("--cosine-corrected", help="A table's values are BRDF times cos(theta_r)."),
+    ] = False,
+    mirror_azimuth: Annotated[
+        bool,
+        typer.Option("--mirror-azimuth", help="A table's azimuth 0 is the mirror side."),
+    ] = False,
     method: Annotated[
         str,
         typer.Option(
@@ -194,6 +202,8 @@ def fit(
         relative=relative,
         u_shared=parse_u_shared(u_shared),
         repeats=repeats,
+        cosine_corrected=cosine_corrected,
+        mirror_azimuth=mirror_azimuth,
     )
     fit_source(source, wanted, models=models, robust=robust, method=method, as_json=json)
 

@@ -103,20 +103,26 @@ def read_table(
     relative: bool = False,
     u_shared: float | None = None,
     repeats: str | None = None,
+    cosine_corrected: bool = False,
+    mirror_azimuth: bool = False,
 ) -> Table:
-    """Read a CSV table of BRDF.
+    """Read a table of BRDF: CSV, or ASTM, Zemax, pab-opto or ALTA text, told by its content.
 
-    Columns theta_i_deg, theta_r_deg, dphi_deg in degrees, brdf in 1/sr and, if known, u_brdf in
-    1/sr. Rows beyond `max_theta_deg` (degrees) are left out. relative: the values have no absolute
-    scale. u_shared: relative u of an error that all values share. repeats: "mean" averages rows of
-    the same geometry. Raises `InputError` for a wrong file, `NotDetermined` if no row is left.
+    CSV has the columns theta_i_deg, theta_r_deg, dphi_deg in degrees, brdf in 1/sr and, if known,
+    u_brdf in 1/sr. Rows beyond `max_theta_deg` (degrees) are left out. relative: the values have no
+    absolute scale. u_shared: relative u of an error that all values share. repeats: "mean" averages
+    rows of the same geometry. cosine_corrected: the values are BRDF times cos(theta_r).
+    mirror_azimuth: azimuth 0 is the mirror side. Raises `InputError` for a wrong file,
+    `NotDetermined` if no row is left.
     """
     wanted = Wanted(
-        format="csv",
+        format="csv" if Path(path).is_dir() else "auto",
         max_theta_deg=max_theta_deg,
         relative=relative,
         u_shared=u_shared,
         repeats=repeats,
+        cosine_corrected=cosine_corrected,
+        mirror_azimuth=mirror_azimuth,
     )
     return Table(read_source(Path(path), wanted))
 

@@ -18,6 +18,7 @@ from analysis.data.csv_table import CsvTable, table_of
 from analysis.data.curet import read_curet
 from analysis.data.measurements import Measurements, SharedError
 from analysis.data.repeats import Repeats, mean_of_repeats
+from analysis.exchange.conventions import from_mirror_azimuth, without_cosine
 from analysis.exchange.imports import READERS, kind_of, read_foreign
 from instrument.config.protocol import FitConfig, WhiteTile
 from instrument.errors import AllFlagged, InputError, NoMeasurement, NotDetermined
@@ -52,7 +53,8 @@ class Wanted:
     format: one of FORMATS. sample: number of the material, for a database. max_theta_deg: largest
     theta_i and theta_r. relative: the values have no absolute scale. u_shared: relative u of an
     error that all values share, None if there is none; a run states its own. repeats: "mean"
-    averages rows of the same geometry in a table; None refuses them.
+    averages rows of the same geometry in a table; None refuses them. cosine_corrected: the values
+    of a table are the BRDF times cos(theta_r). mirror_azimuth: its azimuth 0 is the mirror side.
     """
 
     format: str = "auto"
@@ -61,6 +63,8 @@ class Wanted:
     relative: bool = False
     u_shared: float | None = None
     repeats: str | None = None
+    cosine_corrected: bool = False
+    mirror_azimuth: bool = False
 
 
 def read_source(path: Path, wanted: Wanted) -> Source:
@@ -81,11 +85,14 @@ def read_source(path: Path, wanted: Wanted) -> Source:
             f"--u-shared: {wanted.u_shared:g} for a run, which states its own shared errors; "
             "allowed for tables"
         )
+    if (wanted.cosine_corrected or wanted.mirror_azimuth) and kind in ("run", "curet"):
+        option = "--cosine-corrected" if wanted.cosine_corrected else "--mirror-azimuth"
+        raise InputError(f"{option}: for a {kind}, whose conventions are known; allowed for tables")
     if kind == "curet":
         source = _curet(path, wanted)
     else:
         source = _run(path) if kind == "run" else _table(path, kind, wanted)
-        source = _cut(source, wanted.max_theta_deg)
+        source = _restated(_cut(source, wanted.max_theta_deg), wanted)
     if wanted.relative:
         source = replace(source, measurements=replace(source.measurements, relative=True))
     if source.measurements.size == 0:
@@ -222,6 +229,19 @@ def _with_assumptions(source: Source, wanted: Wanted, *, states_shared: bool) ->
         text = "assumed: lamp, lens and measured patch are small: no value is a mean over angles"
         notes.append(Note(NoteCode.ASSUMED_SMALL_ACCEPTANCE, text))
     return replace(source, notes=tuple(notes))
+
+
+def _restated(source: Source, wanted: Wanted) -> Source:
+    """Bring a table to the program's own conventions from those that its user named."""
+    m, said = source.measurements, []
+    if wanted.cosine_corrected:
+        m = without_cosine(m)
+        said.append("the values were divided by cos(theta_r) (--cosine-corrected)")
+    if wanted.mirror_azimuth:
+        m = from_mirror_azimuth(m)
+        said.append("dphi was turned by 180 degrees (--mirror-azimuth)")
+    notes = tuple(Note(NoteCode.RESTATED, text) for text in said)
+    return replace(source, measurements=m, notes=source.notes + notes)
 
 
 def _curet(path: Path, wanted: Wanted) -> Source:

@@ -45,6 +45,7 @@ class NoteCode(StrEnum):
     FLAGGED = "flagged"
     DAMAGED = "damaged"
     REPEATS = "repeats"
+    RESTATED = "restated"
     IGNORED_U = "ignored_u"
     U_SHARED = "u_shared"
     ASSUMED_NO_SHARED_ERROR = "assumed_no_shared_error"

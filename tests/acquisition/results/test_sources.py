@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from acquisition.engine.engine import Engine
@@ -15,7 +16,7 @@ from acquisition.results.sources import Wanted, read_source
 from acquisition.rig import open_devices
 from analysis.choice.notes import NoteCode
 from instrument.config.load import Loaded, load_protocol
-from instrument.errors import AllFlagged
+from instrument.errors import AllFlagged, InputError
 from instrument.record.record import Record
 from tests.support.scans import changed, small_demo
 
@@ -90,3 +91,34 @@ def test_repeats_are_averaged_on_request(tmp_path: Path) -> None:
     (note,) = (n for n in source.notes if n.code == NoteCode.REPEATS)
     assert note.text.startswith("1 of 2 geometries are means of 2 repeats, which scatter by 7.1 ti")
     assert note.text.endswith("the u is too small for what changes between repeats")
+
+
+def test_conventions_of_a_table_are_taken_from_its_user(tmp_path: Path) -> None:
+    path = tmp_path / "other.csv"
+    path.write_text(
+        "theta_i_deg,theta_r_deg,dphi_deg,brdf,u_brdf\n30,60,180,0.1,0.01\n30,-60,0,.2,.01\n"
+    )
+    wanted = Wanted(cosine_corrected=True, mirror_azimuth=True, repeats="mean")
+    source = read_source(path, wanted)
+    m = source.measurements
+    np.testing.assert_allclose(m.brdf, [0.2, 0.4], rtol=1e-12)
+    assert m.u_random is not None
+    np.testing.assert_allclose(m.u_random, [0.02, 0.02], rtol=1e-12)
+    np.testing.assert_allclose(m.geometry.cos_dphi, 1.0)
+    said = [note.text for note in source.notes if note.code == NoteCode.RESTATED]
+    assert ["--cosine-corrected" in said[0], "--mirror-azimuth" in said[1]] == [True, True]
+
+
+def test_a_grazing_value_with_a_cosine_is_refused_unless_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "other.csv"
+    path.write_text("theta_i_deg,theta_r_deg,dphi_deg,brdf\n30,90,0,0\n30,0,0,.2\n")
+    with pytest.raises(InputError, match=r"--cosine-corrected: 1 of 2 .*--max-theta-deg 89"):
+        read_source(path, Wanted(cosine_corrected=True))
+    kept = read_source(path, Wanted(cosine_corrected=True, max_theta_deg=89.0))
+    assert kept.measurements.brdf.tolist() == [0.2]
+
+
+@pytest.mark.parametrize("option", ["cosine_corrected", "mirror_azimuth"])
+def test_a_run_has_its_own_conventions(resumed_with_a_darker_lamp: Path, option: str) -> None:
+    with pytest.raises(InputError, match=f"--{option.replace('_', '-')}: for a run"):
+        read_source(resumed_with_a_darker_lamp, Wanted(**{option: True}))
