@@ -23,7 +23,8 @@ def export(
         str,
         typer.Option(
             "--format",
-            help="Format of the file: csv, astm, zemax, pab, alta, nexus, merl, mitsuba.",
+            help="Format of the file: csv, astm, zemax, pab, alta, nexus, merl, mitsuba, "
+            "openmaterial.",
             autocompletion=_format_names,
         ),
     ],
