@@ -17,12 +17,14 @@ class Format(NamedTuple):
 
     suffix: of its file name. about: what it holds and who reads it, in a few words. files: yields
     name and content of each file that an export consists of, the main one first; it raises
-    `InputError` for what the format cannot hold, before anything is written.
+    `InputError` for what the format cannot hold, before anything is written. holds_flagged: points
+    with a flag are in it too, with their flags.
     """
 
     suffix: str
     about: str
     files: Callable[[Export, str], Iterator[tuple[str, bytes]]]
+    holds_flagged: bool = False
 
 
 def _own_table(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
@@ -31,7 +33,7 @@ def _own_table(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
 
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
-        "csv": Format(".csv", "all that was measured, as measurements.csv", _own_table),
+        "csv": Format(".csv", "all that was measured, as measurements.csv", _own_table, True),
         "nexus": Format(".nxs", "NeXus/HDF5, for NeXpy and h5web", nexus.files),
         "merl": Format(".binary", "the model on the MERL grid, for renderers", merl.files),
         "astm": Format(".astm", "ASTM E1392 text, for libbsdf and others", astm.files),

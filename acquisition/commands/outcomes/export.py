@@ -27,9 +27,9 @@ from instrument.text.quoting import printable
 def export_run(run: Path, name: str, path: Path) -> None:
     """Write a run in the format `name` to `path` and print the files' names.
 
-    All files are composed before the first is written. Points with a flag are left out, which is
-    printed. Raises `InputError` for a format or name that is not allowed, and for a run that the
-    format cannot hold.
+    All files are composed before the first is written, and none replaces another. Points with a
+    flag are left out, which is printed. Raises `InputError` for a format or a name that is not
+    allowed, for a run that the format cannot hold, and for a file that exists.
     """
     wanted = _format(name, path)
     with Record.open(run) as record:
@@ -40,14 +40,22 @@ def export_run(run: Path, name: str, path: Path) -> None:
         fitted = fit_run(reduced, loaded)
     kept = reduced.valid
     export = _export(reduced, fitted, loaded, kept)
-    files = list(wanted.files(export, path.stem))
-    for file_name, content in files:
-        write_whole(path.with_name(file_name), content)
-    for file_name, _ in files:
-        out.print(str(path.with_name(file_name)), highlight=False, soft_wrap=True)
+    files = {path.with_name(name): data for name, data in wanted.files(export, path.stem)}
+    _write(files)
+    for file in files:
+        out.print(str(file), highlight=False, soft_wrap=True)
     flagged = int(np.sum(~kept))
-    if flagged:
+    if flagged and not wanted.holds_flagged:
         print_notes((f"{flagged} of {kept.size} points are flagged and left out",))
+
+
+def _write(files: Mapping[Path, bytes]) -> None:
+    """Write all files, or none if one of them exists."""
+    taken = [str(file) for file in files if file.exists()]
+    if taken:
+        raise InputError(f"{', '.join(taken)}: exists already: choose another name for --output")
+    for file, content in files.items():
+        write_whole(file, content, new=True)
 
 
 def _format(name: str, path: Path) -> Format:

@@ -63,6 +63,16 @@ def test_a_wrong_format_or_name_writes_nothing(
     assert not list(tmp_path.iterdir())
 
 
+def test_no_file_is_replaced_by_an_export_or_its_side_file(run: Path, tmp_path: Path) -> None:
+    kept = tmp_path / "mine.json"
+    kept.write_text("mine")
+    done = gonio("export", run, "--format", "merl", "-o", tmp_path / "mine.binary")
+    assert done.returncode == 2
+    assert "mine.json: exists already" in " ".join(done.stderr.split())
+    assert kept.read_text() == "mine"
+    assert list(tmp_path.iterdir()) == [kept]
+
+
 def test_a_folder_that_is_no_run_is_named(tmp_path: Path) -> None:
     done = gonio("export", tmp_path, "--format", "csv", "-o", tmp_path / "mine.csv")
     assert done.returncode == 2
