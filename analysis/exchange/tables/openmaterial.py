@@ -66,7 +66,7 @@ def files(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
 
 def _metadata(export: Export) -> dict[str, object]:
     identity = f"gonio: {export.sample}, {one_line(export.facts.get('measurement', ''))}"
-    stated = {
+    stated: dict[str, object] = {
         "name": export.sample,
         "description": "; ".join(fact_lines(export)) or _UNKNOWN,
         "uuid": str(uuid.uuid5(uuid.NAMESPACE_OID, identity)),
