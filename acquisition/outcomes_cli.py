@@ -24,7 +24,7 @@ def export(
         typer.Option(
             "--format",
             help="Format of the file: csv, astm, zemax, pab, alta, nexus, merl, mitsuba, "
-            "openmaterial.",
+            "radiance, openmaterial.",
             autocompletion=_format_names,
         ),
     ],

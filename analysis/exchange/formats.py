@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from analysis.exchange.dense import merl, nexus, zemax
 from analysis.exchange.exported import Export
-from analysis.exchange.materials import mitsuba
+from analysis.exchange.materials import mitsuba, radiance
 from analysis.exchange.tables import alta, astm, openmaterial, pab
 
 
@@ -41,6 +41,7 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         "pab": Format(".pab", "pab-opto text, for pabopto2bsdf of Radiance", pab.files),
         "alta": Format(".alta", "ALTA text with error bars, for fits by ALTA", alta.files),
         "mitsuba": Format(".xml", "material of Mitsuba 3: the model", mitsuba.files),
+        "radiance": Format(".rad", "material of Radiance: the model", radiance.files),
         "openmaterial": Format(
             ".xompt", "OpenMATERIAL 3D, for simulated car sensors", openmaterial.files
         ),
