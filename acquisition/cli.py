@@ -143,8 +143,7 @@ def fit(
     format: Annotated[
         str,
         typer.Option(
-            help="run, csv, astm, zemax, pab, alta or curet; auto: a run if SOURCE is a folder, "
-            "else a table by its content.",
+            help="run, csv, astm, zemax, pab, alta or curet; auto: by content.",
             autocompletion=_among(("auto", "run", "csv", "astm", "zemax", "pab", "alta", "curet")),
         ),
     ] = "auto",

@@ -15,7 +15,7 @@ from acquisition.results.run_folder import load_run_inputs
 from analysis.choice.notes import Note, NoteCode
 from analysis.data.acceptance import Acceptance
 from analysis.data.csv_table import CsvTable, table_of
-from analysis.data.curet import read_curet
+from analysis.data.curet import TABLE, VALUES, read_curet
 from analysis.data.measurements import Measurements, SharedError
 from analysis.data.repeats import Repeats, mean_of_repeats
 from analysis.exchange.conventions import from_mirror_azimuth, without_cosine
@@ -122,6 +122,8 @@ def _kind(path: Path) -> str:
         return "csv"
     if (path / FILE_NAME).exists():
         return "run"
+    if all((path / name).is_file() for name in (TABLE, VALUES)):
+        return "curet"
     raise InputError(
         f"{path}: a folder without {FILE_NAME} is no run; name a run's folder or a CSV file, or "
         "add --format curet --sample N for a folder of the CUReT database"

@@ -18,6 +18,7 @@ from analysis.choice.notes import NoteCode
 from instrument.config.load import Loaded, load_protocol
 from instrument.errors import AllFlagged, InputError
 from instrument.record.record import Record
+from tests.support.analysis import curet_texts
 from tests.support.scans import changed, small_demo
 
 
@@ -122,3 +123,11 @@ def test_a_grazing_value_with_a_cosine_is_refused_unless_left_out(tmp_path: Path
 def test_a_run_has_its_own_conventions(resumed_with_a_darker_lamp: Path, option: str) -> None:
     with pytest.raises(InputError, match=f"--{option.replace('_', '-')}: for a run"):
         read_source(resumed_with_a_darker_lamp, Wanted(**{option: True}))
+
+
+def test_a_folder_of_the_curet_database_is_recognised(tmp_path: Path) -> None:
+    (tmp_path / "table.txt").write_text(curet_texts.TABLE)
+    (tmp_path / "abrdf.dat").write_text(curet_texts.VALUES)
+    assert read_source(tmp_path, Wanted(sample=1)).measurements.size == 3
+    with pytest.raises(InputError, match=r"--sample: missing for the format curet"):
+        read_source(tmp_path, Wanted())
