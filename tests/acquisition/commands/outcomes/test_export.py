@@ -45,9 +45,21 @@ def test_a_table_for_another_program_holds_the_run_and_can_be_fitted(
     assert gonio("fit", path, "--models", "lambert").returncode == 0
 
 
+@pytest.mark.parametrize("name", ["nexus", "merl", "mitsuba", "radiance"])
+def test_the_model_of_a_run_is_exported(run: Path, tmp_path: Path, name: str) -> None:
+    pytest.importorskip("h5py", reason="the library of NeXus files is not installed")
+    path = tmp_path / f"mine{FORMATS[name].suffix}"
+    done = gonio("export", run, "--format", name, "-o", path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split()[0] == str(path)
+    assert {Path(line) for line in done.stdout.split()} == set(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("format_name", "file", "words"),
     [
+        ("openmaterial", "mine_brdf.xompt", "state `metadata: wavelength_nm`"),
+        ("radiance", "my paint.rad", "without spaces"),
         ("cvs", "mine.csv", "did you mean csv?"),
         ("excel", "mine.csv", "allowed: csv"),
         ("csv", "mine.txt", "must end in .csv"),
