@@ -14,7 +14,7 @@ Both directions point away from the surface; the azimuth is that of the light le
 (ALTA's own sources put the view at azimuth 0): the negative of the program's dphi, 0 on the lamp's
 side, pi on the mirror side. `#VS 1` announces a radius of each value, here its standard
 uncertainty, k = 1 (ALTA, "Data File Formats"; Inria 2013-2017); it is left out where a u is not
-known. Readers skip the spaces after `#` in search of a key, so that a comment begins with `#;`.
+known.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def files(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
         f"#PARAM_IN {_ISOTROPIC}",
         "#PARAM_OUT INV_STERADIAN",
         *(["#VS 1"] if known else []),
-        *(f"#; {comment}" for comment in comments),
+        *(f"# {comment}" for comment in comments),
         "#ALTA HEADER END",
         *(" ".join(map(exact, row)) for row in np.transpose([*columns, u_brdf][: 4 + known])),
         "",

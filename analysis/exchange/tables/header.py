@@ -10,13 +10,13 @@ from analysis.exchange.exported import Export, fact_lines
 
 
 def stated(export: Export) -> list[str]:
-    """Facts and solid angles as `name: text`, each on one line of printable characters."""
+    """Facts and solid angles as `name: text`, each on one line."""
     table = export.table
     lines = fact_lines(export)
     for name, value in (("source", table.source_sr), ("receiver", table.receiver_sr)):
         if value is not None:
             lines.append(f"{name}_solid_angle_sr: {exact(value)}")
-    return ["".join(c if c.isprintable() else "?" for c in line) for line in lines]
+    return lines
 
 
 def exact(value: float) -> str:

@@ -54,7 +54,7 @@ def files(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
 
 
 def _header(export: Export, theta_i: float) -> list[str]:
-    name = "".join(c if c.isprintable() else "?" for c in export.sample).replace('"', "'")
+    name = export.sample.replace('"', "'")
     facts = [
         f"# {line[start : start + _LONGEST_LINE]}"
         for line in stated(export)

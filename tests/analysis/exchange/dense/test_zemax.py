@@ -101,13 +101,16 @@ def test_a_lambertian_surface_reflects_its_albedo(azimuths: ArrayLike) -> None:
     np.testing.assert_allclose(found.tis, 0.5, rtol=1e-3)
 
 
-def test_what_lies_between_azimuths_is_interpolated_and_marked() -> None:
-    i, r, dphi = np.meshgrid([30.0], np.arange(-80.0, 81.0, 5.0), np.arange(0.0, 180.0, 30.0))
+@pytest.mark.parametrize("first", [0.0, 15.0])  # with the plane of incidence, and without it
+def test_what_lies_between_azimuths_is_interpolated_and_marked(first: float) -> None:
+    azimuths = np.arange(first, 180.0, 30.0)
+    i, r, dphi = np.meshgrid([30.0], np.arange(-80.0, 81.0, 5.0), azimuths)
     geometry = Geometry.from_degrees(theta_i=i.ravel(), theta_r=r.ravel(), dphi=dphi.ravel())
     model = {"albedo": 0.6, "sigma_deg": 25.0}
     found = zemax_reader.read_zemax(written(of_model("oren_nayar", geometry, **model)))
     between = marks(found)[0] == "i"
     assert np.mean(between) > 0.3
+    assert "h" not in marks(found)[0, :, 1:8]  # within 35 degrees of the specular direction
     theta_r, dphi = (a[between] for a in found.angles(0))
     nodes = Geometry.from_degrees(theta_i=30.0, theta_r=theta_r, dphi=dphi)
     truth = MODELS["oren_nayar"].brdf(nodes, **model)

@@ -25,6 +25,7 @@ def test_another_reader_finds_the_values_as_measured(seed: int) -> None:
     count, names, numbers = read_astm(content.decode())
     wavelength = export.facts.get("wavelength_nm")
     assert name == "mine.astm"
+    assert all(line.isprintable() for line in content.decode().split("\n"))
     assert count == export.table.size == len(numbers)
     assert names[:4] == ["theta_i", "phi_i", "theta_s", "phi_s"]
     assert names[4:] == [f"{wavelength}nm" if wavelength in {"550", "632.8"} else "BRDF"]
