@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -31,8 +32,10 @@ def _written(export: Export, folder: Path) -> str:
 
 
 def _package() -> Path:
-    installed = pytest.importorskip("pyradiance", reason="pyradiance is a development extra")
-    return Path(installed.__file__).parent
+    found = find_spec("pyradiance")
+    if found is None or found.origin is None:
+        pytest.skip("pyradiance, a development extra, is not installed")
+    return Path(found.origin).parent
 
 
 def _ran(package: Path, folder: Path, command: list[str], text: bytes = b"") -> bytes:
