@@ -43,6 +43,10 @@ def test_a_table_for_another_program_holds_the_run_and_can_be_fitted(
     assert set(theirs.brdf) <= set(ours.brdf)
     assert theirs.size == np.sum(np.isin(ours.theta_i_deg, theirs.theta_i_deg))
     assert gonio("fit", path, "--models", "lambert").returncode == 0
+    if (beside := path.with_suffix(".u.csv")).exists():
+        with_u = read_source(beside, Wanted()).measurements
+        assert with_u.u_random is not None
+        assert sorted(with_u.brdf) == sorted(ours.brdf)
 
 
 @pytest.mark.parametrize("name", ["nexus", "merl", "mitsuba", "radiance"])
