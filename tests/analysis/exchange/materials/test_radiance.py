@@ -54,9 +54,16 @@ def _unit(theta: FloatArray, phi: FloatArray) -> FloatArray:
     return np.stack(xyz, axis=-1)
 
 
-def _scene(package: Path, folder: Path, more: str) -> None:
-    """A wide plane of the material, facing up, and what shines on it."""
-    plane = "mine polygon plane 0 0 12 -9 -9 0 9 -9 0 9 9 0 -9 9 0\n"
+def _rotation(rng: np.random.Generator) -> FloatArray:
+    """Random rotation (3, 3)."""
+    q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    return np.asarray(q * np.sign(np.linalg.det(q)))
+
+
+def _scene(package: Path, folder: Path, turned: FloatArray, more: str) -> None:
+    """A wide plane of the material, facing the z-axis of a rotation (3, 3), and its light."""
+    corners = np.array([[-9, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]]) @ turned.T
+    plane = f"mine polygon plane 0 0 12 {' '.join(map(repr, corners.ravel().tolist()))}\n"
     text = (folder / "mine.rad").read_text() + plane + more
     (folder / "scene.oct").write_bytes(_ran(package, folder, ["oconv", "-"], text.encode()))
 
@@ -81,18 +88,19 @@ def _seen(package: Path, folder: Path, views: FloatArray, *options: str) -> Floa
 def test_rtrace_sees_the_models_brdf(
     name: str, values: dict[str, float], off: float, tmp_path: Path
 ) -> None:
-    """Radiance over irradiance of a lamp of half a degree, all round."""
+    """Radiance over irradiance of a lamp of half a degree, all round, on tilted planes."""
     package, model = _package(), fitted(name, **values)
     _written(explained_by(model, RANDOM), tmp_path)
     rng = np.random.default_rng(4)
     solid_angle = 2 * math.pi * (1 - math.cos(math.radians(_LAMP_DEG / 2)))
     for lamp in _unit(rng.uniform(0.02, 1.2, _LAMPS), rng.uniform(0, 6.28, _LAMPS)):
-        x, y, z = lamp.tolist()
+        turned = _rotation(rng)
+        x, y, z = (turned @ lamp).tolist()
         sun = f"void light lamp 0 0 3 1e5 1e5 1e5\nlamp source sun 0 0 4 {x} {y} {z} {_LAMP_DEG}\n"
-        _scene(package, tmp_path, sun)
+        _scene(package, tmp_path, turned, sun)
         views = _unit(rng.uniform(0.02, 1.2, _VIEWS), rng.uniform(0, 6.28, _VIEWS))
-        radiances = _seen(package, tmp_path, views, "-ab", "0", "-dj", "0", "-aa", "0")
-        seen = radiances / (1e5 * solid_angle * z)
+        radiances = _seen(package, tmp_path, views @ turned.T, "-ab", "0", "-dj", "0", "-aa", "0")
+        seen = radiances / (1e5 * solid_angle * lamp[2])
         expected = model.brdf(Geometry.from_directions(lamp, views))
         np.testing.assert_allclose(seen, expected, rtol=off, atol=1e-3 * np.max(expected))
 
@@ -107,7 +115,8 @@ def test_even_light_from_all_sides_is_reflected_as_the_model_does(tmp_path: Path
     expected = math.pi * np.mean(model.brdf(Geometry.from_degrees(theta_i=i, theta_r=r, dphi=dphi)))
     (colour,) = set(re.findall(r"^4 (\S+) \1 \1 1$", text, re.MULTILINE))
     assert float(colour) == pytest.approx(expected, rel=0.01)
-    _scene(package, tmp_path, "void glow sky 0 0 4 1 1 1 0\nsky source all 0 0 4 0 0 1 360\n")
+    sky = "void glow sky 0 0 4 1 1 1 0\nsky source all 0 0 4 0 0 1 360\n"
+    _scene(package, tmp_path, np.eye(3), sky)
     seen = _seen(package, tmp_path, np.array([[0.0, 0.0, 1.0]]), "-ab", "1", "-ad", "2000")
     assert seen[0] == pytest.approx(expected, rel=0.03)
 
