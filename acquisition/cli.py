@@ -224,11 +224,17 @@ def models(
 
 
 @app.command()
-def report(folder: RunFolder, json: Json = False) -> None:
+def report(
+    folder: RunFolder,
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="Print it to report.pdf, too; needs a Chromium.")
+    ] = False,
+    json: Json = False,
+) -> None:
     """Fit a run again and rewrite its table and its report."""
     from acquisition.commands.scan import report_run
 
-    report_run(folder, as_json=json)
+    report_run(folder, pdf=pdf, as_json=json)
 
 
 for command in (export, compare, runs):

@@ -1,0 +1,51 @@
+"""`gonio report --pdf`: printed by an installed Chromium, or refused before anything is written."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from acquisition.commands.outcomes.pdf import BROWSERS
+from tests.support.command import gonio_here as gonio
+from tests.support.scans import TWO_MODELS, small_demo
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("printed")
+    done = gonio("run", small_demo(folder, TWO_MODELS), "--out", folder / "run")
+    assert done.returncode == 0, done.stderr
+    return folder / "run"
+
+
+@pytest.mark.skipif(not any(map(shutil.which, BROWSERS)), reason="no Chromium: install chromium")
+def test_a_report_is_printed(run: Path) -> None:
+    done = gonio("report", run, "--pdf")
+    assert done.returncode == 0, done.stderr
+    printed = (run / "report.pdf").read_bytes()
+    assert printed.startswith(b"%PDF-")
+    assert 1 <= printed.count(b"/Type /Page\n") <= 12
+    assert str(run / "report.pdf") in done.stderr
+
+
+def test_without_a_browser_nothing_is_written(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(run))
+    before = (run / "report.html").stat().st_mtime_ns
+    done = gonio("report", run, "--pdf")
+    assert done.returncode == 2
+    assert "chromium" in done.stderr
+    assert (run / "report.html").stat().st_mtime_ns == before
+
+
+def test_a_browser_that_fails_is_named(run: Path, tmp_path: Path) -> None:
+    stand_in = tmp_path / "chromium"
+    stand_in.write_text("#!/bin/sh\necho broken >&2\n")
+    stand_in.chmod(0o755)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("PATH", str(tmp_path), prepend=":")
+        done = gonio("report", run, "--pdf")
+    assert done.returncode == 3
+    assert "broken" in done.stderr
+    assert (run / "report.html").is_file()
