@@ -40,7 +40,8 @@ def export_run(run: Path, name: str, path: Path) -> None:
         fitted = fit_run(reduced, loaded)
     kept = reduced.valid
     export = _export(reduced, fitted, loaded, kept)
-    files = {path.with_name(name): data for name, data in wanted.files(export, path.stem)}
+    with sign_of_life(f"{name} file"):
+        files = {path.with_name(file): data for file, data in wanted.files(export, path.stem)}
     _write(files)
     for file in files:
         out.print(str(file), highlight=False, soft_wrap=True)
