@@ -37,9 +37,9 @@ def common_geometries(runs: Sequence[Measurements]) -> list[IntArray]:
 def _places(m: Measurements) -> FloatArray:
     """Geometries as points (N, 3) whose distances are about those of the angles, in degrees."""
     g = m.geometry
-    x, y = np.cos(np.radians(g.dphi_deg)), np.sin(np.radians(g.dphi_deg))
-    turned = np.where(g.theta_i_deg < SAME_DEG, 0.0, 1.0)  # at normal incidence dphi is arbitrary
-    x, y = np.where(turned, x, 1.0), np.where(turned, y, 0.0)
+    at_normal = g.theta_i_deg < SAME_DEG  # there dphi is arbitrary
+    x = np.where(at_normal, 1.0, g.cos_dphi)
+    y = np.where(at_normal, 0.0, np.sin(np.radians(g.dphi_deg)))
     return np.stack([g.theta_i_deg, g.theta_r_deg * x, g.theta_r_deg * y], axis=-1)
 
 

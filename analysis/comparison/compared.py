@@ -8,6 +8,7 @@ import numpy as np
 
 from analysis.comparison.agreement import Agreement
 from analysis.data.measurements import Measurements
+from analysis.report.style import format_value
 from instrument.geometry import FloatArray
 
 
@@ -27,6 +28,13 @@ class Compared:
     brdf: FloatArray
     agreement: Agreement
     same_tile: bool
+
+    @property
+    def runs(self) -> list[tuple[str, str, int, float, float]]:
+        """Name, sample, number of points, level and its u of each run, a ratio to the first."""
+        a = self.agreement
+        levels = a.factors.tolist(), a.u_factors.tolist()
+        return list(zip(self.names, self.samples, self.points, *levels, strict=True))
 
     @property
     def headline(self) -> str:
@@ -62,3 +70,8 @@ class Compared:
         at = self.at
         i, r, phi = (float(a[geometry]) for a in (at.theta_i_deg, at.theta_r_deg, at.dphi_deg))
         return f"θi {i:g}°, θr {r:g}°, Δφ {phi:g}°"
+
+
+def level_text(level: float, u: float) -> str:
+    """Return a run's level with its u; of the first, which has none, the number alone."""
+    return format_value(level, u) if u else f"{level:g}"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.comparison.agreement import DISAGREE
-from analysis.comparison.compared import Compared
+from analysis.comparison.compared import Compared, level_text
 from analysis.data.sweeps import Sweep, signed_view, sweeps
 from analysis.report.charts import MAX_SWEEPS, margins
 from analysis.report.style import (
@@ -15,11 +15,13 @@ from analysis.report.style import (
     CSS,
     INK,
     escaped,
-    format_value,
+    figure_html,
     html_page,
+    row_html,
     short_number,
     style_of,
     svg_of,
+    table_html,
 )
 from analysis.report.value_axis import set_symmetric_axis
 
@@ -66,32 +68,20 @@ def _verdict(compared: Compared) -> str:
 
 
 def _levels(compared: Compared) -> str:
-    a = compared.agreement
-    rows = [
-        _row(
-            _run(compared, k),
-            str(compared.points[k]),
-            "1" if k == 0 else format_value(float(a.factors[k]), float(a.u_factors[k])),
-        )
-        for k in range(len(compared.names))
-    ]
-    head = "<tr><th>Run</th><th class='number'>Points</th><th class='number'>Level ± u</th></tr>"
+    rows = (
+        row_html((_run(compared, k), f"#{points}", f"#{level_text(level, u)}"))
+        for k, (_, _, points, level, u) in enumerate(compared.runs)
+    )
     return (
-        f'<h2 id="levels">Levels</h2>\n<div class="wide"><table><thead>{head}</thead><tbody>'
-        f'{"".join(rows)}</tbody></table></div>\n<p class="soft">Level: relative to the first run, '
-        "with all errors that the runs do not share (k = 1).</p>"
+        f'<h2 id="levels">Levels</h2>\n{table_html(("Run", "#Points", "#Level ± u"), rows)}\n'
+        '<p class="soft">Level: relative to the first run, with all errors that the runs do not '
+        "share (k = 1).</p>"
     )
 
 
 def _run(compared: Compared, k: int) -> str:
     sample = f", {compared.samples[k]}" if compared.samples[k] else ""
     return escaped(f"{compared.names[k]}{sample}")
-
-
-def _row(*cells: str) -> str:
-    first, *others = cells
-    numbers = "".join(f'<td class="number">{cell}</td>' for cell in others)
-    return f"<tr><td>{first}</td>{numbers}</tr>"
 
 
 def _charts(compared: Compared) -> str:
@@ -101,29 +91,28 @@ def _charts(compared: Compared) -> str:
     rows = -(-len(shown) // _COLUMNS)
     columns = min(len(shown), _COLUMNS)
 
-    def draw(figure: Figure) -> None:
-        places = {"hspace": 0.28, "wspace": 0.22, **margins(figure, 0.8, 0.15, 0.65, 0.6)}
-        outer = figure.add_gridspec(rows, columns, **places)
+    def draw(canvas: Figure) -> None:
+        places = {"hspace": 0.28, "wspace": 0.22, **margins(canvas, 0.8, 0.15, 0.65, 0.6)}
+        outer = canvas.add_gridspec(rows, columns, **places)
         for number, sweep in enumerate(shown):
             inner = outer[number // columns, number % columns].subgridspec(
                 2, 1, height_ratios=(2, 1), hspace=0.1
             )
-            upper = figure.add_subplot(inner[0])
-            lower = figure.add_subplot(inner[1], sharex=upper)
+            upper = canvas.add_subplot(inner[0])
+            lower = canvas.add_subplot(inner[1], sharex=upper)
             _panel(upper, lower, compared, sweep)
-        handles, labels = figure.axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="upper left", ncols=4, frameon=False)
+        handles, labels = canvas.axes[0].get_legend_handles_labels()
+        canvas.legend(handles, labels, loc="upper left", ncols=4, frameon=False)
 
     svg = svg_of(0.7 + _ROW_IN * rows, draw, "compared")
-    svg = svg.replace("<svg ", '<svg role="img" aria-label="BRDF of all runs, and differences" ', 1)
     more = len(sweeps(compared.at)) - len(shown)
     left_out = f" {more} more planes are not drawn." if more > 0 else ""
-    return (
-        f'<h2 id="curves">Curves and differences</h2>\n<figure>\n<div class="chart">{svg}</div>'
-        "<figcaption>Above: BRDF of each run with its independent u (k = 1). Below: difference to "
-        f"run 1 in its standard uncertainty; the band is ±2 u.{left_out} "
-        f"{escaped(_legend(compared))}</figcaption>\n</figure>"
+    caption = (
+        "Above: BRDF of each run with its independent u (k = 1). Below: difference to run 1 in its "
+        f"standard uncertainty; the band is ±2 u.{left_out} {escaped(_legend(compared))}"
     )
+    chart = figure_html([svg], "BRDF of all runs, and differences", caption)
+    return f'<h2 id="curves">Curves and differences</h2>\n{chart}'
 
 
 def _legend(compared: Compared) -> str:
@@ -175,14 +164,11 @@ def _differences(compared: Compared) -> str:
     numbers = range(1, len(compared.names) + 1)
     heads = ["θᵢ (°)", "θᵣ (°)", "Δφ (°)", *(f"Run {k} (1/sr)" for k in numbers)]
     heads += [*(f"Run {k} − 1 (u)" for k in numbers[1:]), "Scatter (%)"]
-    head = "".join(f'<th class="number">{h}</th>' for h in heads)
     rows = [_geometry_row(compared, n) for n in range(min(compared.at.size, _MOST_ROWS))]
     left_out = compared.at.size - len(rows)
     more = f'<p class="soft">{left_out} more are not shown.</p>' if left_out else ""
-    return (
-        '<h2 id="geometries">Geometries</h2>\n<div class="wide"><table><thead><tr>'
-        f"{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>{more}"
-    )
+    shown = table_html((f"#{head}" for head in heads), rows)
+    return f'<h2 id="geometries">Geometries</h2>\n{shown}{more}'
 
 
 def _geometry_row(compared: Compared, n: int) -> str:
@@ -191,5 +177,4 @@ def _geometry_row(compared: Compared, n: int) -> str:
     cells += [f"{value:#.4g}" for value in compared.brdf[:, n]]
     cells += [f"{value + 0.0:+.1f}" for value in np.round(compared.difference_in_u[1:, n], 1)]
     cells.append(f"{100 * float(compared.agreement.scatter[n]):#.3g}")
-    numbers = "".join(f'<td class="number">{c.replace("-", "−")}</td>' for c in cells)
-    return f"<tr>{numbers}</tr>"
+    return row_html("#" + cell.replace("-", "−") for cell in cells)

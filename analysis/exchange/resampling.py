@@ -58,7 +58,7 @@ def side_file(
 
     note: the file's statement in words. more: further entries.
     """
-    table, units = export.table, {p.name: p.unit for p in MODELS[model.name].parameters}
+    table, units = export.table, _units(model)
     parameters = {
         name: {"value": value, "u": model.u.get(name), "unit": units.get(name, "")}
         for name, value in model.values.items()
@@ -85,13 +85,17 @@ def side_file(
 
 def model_comment(model: ExportedModel) -> list[str]:
     """Lines that name the model, its parameters with u, and the verdict on it."""
-    units = {p.name: p.unit for p in MODELS[model.name].parameters}
+    units = _units(model)
     lines = [f"modelled, not measured: {model.name}, fitted by gonio; verdict: {model.verdict}"]
     for name, value in model.values.items():
         u, unit = model.u.get(name), units.get(name, "").removesuffix("1")
         known = "u not determined" if u is None else f"u = {u:.2g}"
         lines.append(f"{name} = {value:.6g} {unit}".rstrip() + f" ({known})")
     return lines
+
+
+def _units(model: ExportedModel) -> dict[str, str]:
+    return {parameter.name: parameter.unit for parameter in MODELS[model.name].parameters}
 
 
 def beyond_measured(table: BrdfTable, geometry: Geometry) -> BoolArray:

@@ -9,14 +9,22 @@ import base64
 import math
 import re
 import struct
-from collections.abc import Iterable
 from pathlib import Path
 
 from analysis.report import captions, charts
 from analysis.report.budget_chart import budget_chart, with_budget
 from analysis.report.data import Candidate, Parameter, ReportData, Rows
 from analysis.report.polar import polar_chart
-from analysis.report.style import CSS, escaped, format_value, html_page, short_number
+from analysis.report.style import (
+    CSS,
+    escaped,
+    figure_html,
+    format_value,
+    html_page,
+    row_html,
+    short_number,
+    table_html,
+)
 from analysis.report.sweeps import PlottedSweep, group_sweeps
 from analysis.report.swept_axis import VIEW
 from instrument.record.reading import Preview
@@ -118,13 +126,13 @@ def _charts(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
     quantity = data.quantity
     figures = [
         '<h2 id="shape">Shape of the reflection</h2>',
-        _figure(
+        figure_html(
             charts.shape_charts(sweeps, quantity),
             f"shape against the {sweeps[0].axis.name}",
             captions.shape_caption(data, sweeps, quantity),
         ),
         f'<h2 id="brdf">{captions.brdf_title(sweeps, name)}</h2>',
-        _figure(
+        figure_html(
             [charts.brdf_chart(sweeps, quantity)], quantity, captions.panel_caption(data, sweeps)
         ),
     ]
@@ -132,16 +140,8 @@ def _charts(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
         polar = [polar_chart(sweeps, quantity)]
         caption = captions.polar_caption(data, sweeps, quantity)
         figures.append(f'<h2 id="polar">{name} around the sample</h2>')
-        figures.append(_figure(polar, f"{quantity}, polar", caption))
+        figures.append(figure_html(polar, f"{quantity}, polar", caption))
     return "\n".join(figures)
-
-
-def _figure(drawings: list[str], label: str, caption: str) -> str:
-    named = f'<svg role="img" aria-label="{escaped(label)}" '
-    drawn = "".join(svg.replace("<svg ", named, 1) for svg in drawings)
-    return (
-        f'<figure>\n<div class="chart">{drawn}</div><figcaption>{caption}</figcaption>\n</figure>'
-    )
 
 
 def _candidates(data: ReportData) -> str:
@@ -151,7 +151,7 @@ def _candidates(data: ReportData) -> str:
     best = min(known, default=None)
     head = ("Model", "Parameters ± u (k = 1)", "#Residual, rms", "#Reduced χ²", "#ΔBIC")
     tag = "✔ chosen" if data.verdict_kind == "adequate" else "best candidate"
-    table = _table(head, (_candidate(c, best, tag) for c in data.ranked), "wide candidates")
+    table = table_html(head, (_candidate(c, best, tag) for c in data.ranked), "wide candidates")
     return (
         f'<h2 id="candidates">Models compared</h2>\n{table}\n'
         '<p class="soft">Residual: relative to the mean. Reduced χ² near 1: the model agrees with '
@@ -182,21 +182,7 @@ def _candidate(candidate: Candidate, best_bic: float | None, tag: str) -> str:
         "#" + short_number(candidate.reduced_chi2, 3),
         "#" + (_number(above, ".1f") if abs(above) < 1000 else short_number(above, 3)),
     )
-    return _row(cells, "chosen" if candidate.chosen else "")
-
-
-def _table(head: Iterable[str], rows: Iterable[str], kind: str = "wide") -> str:
-    body = f"<thead>{_row(head, cell='th')}</thead><tbody>{''.join(rows)}</tbody>"
-    return f'<div class="{kind}"><table>{body}</table></div>'
-
-
-def _row(cells: Iterable[str], style: str = "", cell: str = "td") -> str:
-    """Table row of cells in HTML; a cell that begins with # is a number."""
-    made = (
-        f'<{cell} class="number">{c[1:]}</{cell}>' if c.startswith("#") else f"<{cell}>{c}</{cell}>"
-        for c in cells
-    )
-    return f'<tr class="{style}">{"".join(made)}</tr>' if style else f"<tr>{''.join(made)}</tr>"
+    return row_html(cells, "chosen" if candidate.chosen else "")
 
 
 def _flagged(data: ReportData) -> str:
@@ -210,11 +196,11 @@ def _flagged(data: ReportData) -> str:
         angles = (data.theta_i_deg[i], data.dphi_deg[i], data.theta_r_deg[i])
         measured = format_value(float(value[i]), float(u[i]), unit)
         cells = (*(f"#{_number(a, 'g')}°" for a in angles), f"#{measured}", escaped(data.flags[i]))
-        rows.append(_row(cells))
+        rows.append(row_html(cells))
     return (
         '<h2 id="flagged">Flagged points</h2>\n'
         '<p class="soft">Marked with a cross; outliers may lie outside a chart.</p>\n'
-        + _table(("#θᵢ", "#Δφ", "#θᵣ", "#Value ± u (k = 1)", "Flag"), rows)
+        + table_html(("#θᵢ", "#Δφ", "#θᵣ", "#Value ± u (k = 1)", "Flag"), rows)
     )
 
 
@@ -222,18 +208,18 @@ def _budget(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
     if not data.budget:
         return ""
     rows = (
-        _row((escaped(name), f"#{_percent(u)}", f"#{_number(share, '.0f')} %", _bar(share)))
+        row_html((escaped(name), f"#{_percent(u)}", f"#{_number(share, '.0f')} %", _bar(share)))
         for name, u, share in data.budget
     )
     drawn, known = "", with_budget(data, sweeps)
     if known:
         label, caption = "uncertainty by source", captions.budget_caption(known)
-        drawn = _figure([budget_chart(data, known)], label, caption)
+        drawn = figure_html([budget_chart(data, known)], label, caption)
     return (
         '<h2 id="budget">Uncertainty budget</h2>\n'
         '<p class="soft">Standard uncertainty (k = 1) of a point, relative to its value.</p>\n'
         + drawn
-        + _table(("Source", "#Relative u, median", "#Share of variance", ""), rows)
+        + table_html(("Source", "#Relative u, median", "#Share of variance", ""), rows)
     )
 
 
@@ -306,5 +292,5 @@ def _facts(data: ReportData) -> str:
 
 
 def _fact(name: str, title: str, rows: Rows) -> str:
-    body = "".join(_row((escaped(label), escaped(value))) for label, value in rows)
+    body = "".join(row_html((escaped(label), escaped(value))) for label, value in rows)
     return f'<section id="{name}"><h3>{title}</h3><table><tbody>{body}</tbody></table></section>'

@@ -188,6 +188,30 @@ def html_page(title: str, css: str, body: Iterable[str]) -> str:
     )
 
 
+def figure_html(drawings: list[str], label: str, caption: str) -> str:
+    """Figure of drawings in SVG, labelled for readers of a screen, and its caption in HTML."""
+    named = f'<svg role="img" aria-label="{escaped(label)}" '
+    drawn = "".join(svg.replace("<svg ", named, 1) for svg in drawings)
+    return (
+        f'<figure>\n<div class="chart">{drawn}</div><figcaption>{caption}</figcaption>\n</figure>'
+    )
+
+
+def table_html(head: Iterable[str], rows: Iterable[str], kind: str = "wide") -> str:
+    """Table of a head and rows in HTML; `kind`: class of the block around it."""
+    body = f"<thead>{row_html(head, cell='th')}</thead><tbody>{''.join(rows)}</tbody>"
+    return f'<div class="{kind}"><table>{body}</table></div>'
+
+
+def row_html(cells: Iterable[str], style: str = "", cell: str = "td") -> str:
+    """Table row of cells in HTML; a cell that begins with # is a number."""
+    made = (
+        f'<{cell} class="number">{c[1:]}</{cell}>' if c.startswith("#") else f"<{cell}>{c}</{cell}>"
+        for c in cells
+    )
+    return f'<tr class="{style}">{"".join(made)}</tr>' if style else f"<tr>{''.join(made)}</tr>"
+
+
 CSS = """
 :root { --ink: #1d1d1f; --soft: #5c5f66; --rule: #d4d6da; --wash: #f5f6f7; }
 * { box-sizing: border-box; }

@@ -34,6 +34,13 @@ def gonio(*arguments: object) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
+def finished_run(protocol: Path, run: Path) -> Path:
+    """Run a protocol into the folder `run`, and return it; fail if the scan fails."""
+    done = gonio_here("run", protocol, "--out", run)
+    assert done.returncode == 0, done.stderr
+    return run
+
+
 def gonio_here(
     *arguments: object, cwd: Path | None = None, encoding: str = "utf-8"
 ) -> subprocess.CompletedProcess[str]:

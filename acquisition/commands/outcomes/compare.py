@@ -17,11 +17,10 @@ from acquisition.terminal.progress import sign_of_life
 from analysis.choice.choice import choose
 from analysis.comparison.agreement import Test, Values, agreement
 from analysis.comparison.common_geometries import SAME_DEG, common_geometries
-from analysis.comparison.compared import Compared
+from analysis.comparison.compared import Compared, level_text
 from analysis.comparison.page import comparison_html
 from analysis.data.covariance import Covariance, full_covariance
 from analysis.fit.certificate import CERTIFICATE
-from analysis.report.style import format_value
 from instrument.errors import InputError
 from instrument.geometry import BoolArray, IntArray
 from instrument.text.atomic_file import write_whole
@@ -121,14 +120,11 @@ def _mask(kept: IntArray, size: int) -> BoolArray:
 
 def _print(found: Compared) -> None:
     a, (scatter, expected) = found.agreement, found.repeatability
-    print_text(f"{found.headline}")
+    print_text(found.headline)
     rows = [
-        (name, sample, str(points), "1" if k == 0 else format_value(factor, u))
-        for k, (name, sample, points, factor, u) in enumerate(
-            zip(found.names, found.samples, found.points, a.factors.tolist(),
-                a.u_factors.tolist(), strict=True)
-        )
-    ]  # fmt: skip
+        (name, sample, str(points), level_text(level, u))
+        for name, sample, points, level, u in found.runs
+    ]
     print_lines(["", *table_lines(("run", "sample", "points", "level ± u"), rows, out.width), ""])
     k, n = found.largest
     tile = "one white tile: the errors of its certificate cancel"
@@ -163,10 +159,7 @@ def _json(found: Compared) -> dict[str, Any]:
         "same_white_tile": found.same_tile,
         "runs": [
             {"run": name, "sample": sample, "points": points, "level": level, "u_level": u}
-            for name, sample, points, level, u in zip(
-                found.names, found.samples, found.points, a.factors.tolist(),
-                a.u_factors.tolist(), strict=True,
-            )
+            for name, sample, points, level, u in found.runs
         ],
         "repeatability": {"scatter_relative": scatter, "explained_relative": expected},
         "geometries": {

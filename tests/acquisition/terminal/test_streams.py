@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from acquisition.cli import main
 from acquisition.terminal import streams
 from acquisition.terminal.streams import HANDLER, lasting_streams
-from tests.support.command import gonio_here, own_signals
+from tests.support.command import finished_run, gonio_here, own_signals
 from tests.support.paths import ROOT
 from tests.support.scans import TWO_MODELS, small_demo
 
@@ -24,9 +24,7 @@ from tests.support.scans import TWO_MODELS, small_demo
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("finished")
-    done = gonio_here("run", small_demo(folder, TWO_MODELS), "--out", folder / "run")
-    assert done.returncode == 0, done.stderr
-    return folder / "run"
+    return finished_run(small_demo(folder, TWO_MODELS), folder / "run")
 
 
 @given(st.text(), st.sampled_from(["ascii", "latin-1", "cp1252", "koi8-r", "utf-8"]))

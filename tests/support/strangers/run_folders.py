@@ -12,7 +12,7 @@ from pathlib import Path
 
 from instrument.record.record import FILE_NAME
 from instrument.record.schema import SCHEMA_VERSION
-from tests.support.command import gonio_here as gonio
+from tests.support.command import finished_run
 from tests.support.paths import CONFIGS
 from tests.support.scans import small_rig
 from tests.support.storage.older_records import as_version, seal_again
@@ -80,9 +80,7 @@ def run_few_points(folder: Path) -> Path:
     text = text.replace("../rigs/bench_12bit.yaml", str(small_rig(folder)))
     text = text.replace("oren_nayar+torrance_sparrow", "oren_nayar").replace(", ks: 0.076", "")
     protocol.write_text(f"{text}fit: {{models: [lambert, oren_nayar]}}\n")
-    done = gonio("run", protocol, "--out", folder / "run")
-    assert done.returncode == 0, done.stderr
-    return folder / "run"
+    return finished_run(protocol, folder / "run")
 
 
 def copy_of(run: Path, to: Path, version: int = SCHEMA_VERSION) -> Sent:

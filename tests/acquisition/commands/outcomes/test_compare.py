@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.command import finished_run
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import small_demo
 
@@ -25,9 +26,7 @@ def measured(folder: Path, seed: int, **changes: str) -> Path:
     for old, new in changes.items():
         text = re.sub(rf"{old}: [\d.]+", f"{old}: {new}", text)
     protocol.write_text(text)
-    done = gonio("run", protocol, "--out", folder / "run")
-    assert done.returncode == 0, done.stderr
-    return folder / "run"
+    return finished_run(protocol, folder / "run")
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ import pytest
 from acquisition.results.sources import Wanted, read_source
 from analysis.exchange.formats import FORMATS
 from analysis.exchange.imports import READERS
+from tests.support.command import finished_run
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import small_demo
 
@@ -17,9 +18,7 @@ from tests.support.scans import small_demo
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("exported")
-    done = gonio("run", small_demo(folder, "lambert, oren_nayar"), "--out", folder / "run")
-    assert done.returncode == 0, done.stderr
-    return folder / "run"
+    return finished_run(small_demo(folder, "lambert, oren_nayar"), folder / "run")
 
 
 def test_csv_is_the_table_of_the_run(run: Path, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.commands.outcomes.pdf import BROWSERS
+from tests.support.command import finished_run
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import TWO_MODELS, small_demo
 
@@ -15,9 +16,7 @@ from tests.support.scans import TWO_MODELS, small_demo
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("printed")
-    done = gonio("run", small_demo(folder, TWO_MODELS), "--out", folder / "run")
-    assert done.returncode == 0, done.stderr
-    return folder / "run"
+    return finished_run(small_demo(folder, TWO_MODELS), folder / "run")
 
 
 @pytest.mark.skipif(not any(map(shutil.which, BROWSERS)), reason="no Chromium: install chromium")

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from instrument.record.record import FILE_NAME
+from tests.support.command import finished_run
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import small_demo
 
@@ -18,8 +19,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished run, the same without its fit, one with a foreign fit, and two that are none."""
     folder = tmp_path_factory.mktemp("runs")
     protocol = small_demo(tmp_path_factory.mktemp("protocol"), "lambert, oren_nayar")
-    done = gonio("run", protocol, "--out", folder / "finished")
-    assert done.returncode == 0, done.stderr
+    finished_run(protocol, folder / "finished")
     for name in ("unfitted", "foreign"):
         shutil.copytree(folder / "finished", folder / name)
     (folder / "unfitted" / "fit.json").unlink()
