@@ -39,7 +39,7 @@ class NewportPort:
 
     def __init__(self, line: Line, address: int, who: str, clock: Clock) -> None:
         self.line, self.address, self.who, self._clock = line, address, who, clock
-        self._deaf = self._stopped = False
+        self._deaf, self._error_may_be_old = False, True
         self.version, self.stage, self._openings = "", "", line.openings
         self.version = self.query("VE", str)
 
@@ -82,13 +82,16 @@ class NewportPort:
         No harder one is known: whether MM0, which disables the motor, is accepted during a motion
         could not be verified, and a beam without current may fall.
         """
-        self._stopped = True
+        self._error_may_be_old = True
         self.line.write_at_once(framing.command(self.address, "ST"))
 
     def _forget_error(self) -> None:
-        """Read the error that a stop may have left which arrived spoilt; it is kept until read."""
-        if self._stopped:
-            self._stopped = False
+        """Read an error that is not of the next command: the controller keeps one until it is read.
+
+        It may be from before the port was opened, or from a stop that arrived spoilt.
+        """
+        if self._error_may_be_old:
+            self._error_may_be_old = False
             self._query_once("TE", str, "")
 
     def _query_once(self, letters: str, parse: Callable[[str], T], value: str) -> T:
@@ -118,7 +121,7 @@ class NewportPort:
         self._require_same("VE", "", self.version)
         if self._openings != self.line.openings:
             self._require_same("ID", "?", self.stage)
-            self._openings = self.line.openings
+            self._openings, self._error_may_be_old = self.line.openings, True
 
     def _require_same(self, letters: str, value: str, before: str) -> None:
         answer = self._exchange(letters, value)

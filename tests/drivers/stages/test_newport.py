@@ -124,3 +124,19 @@ def test_a_stop_reaches_a_controller_that_is_deaf_after_the_move_command(
 def _start(stage: NewportStage) -> None:
     with contextlib.suppress(Stopped):
         stage.start_move(70.0)
+
+
+@pytest.mark.parametrize("before", [b"/1 stop\r\n", b"1PA\xff\r\n", b"1XX\r\n", b"PA1000\r\n"])
+def test_an_error_from_before_the_port_was_opened_is_not_taken_for_the_first_commands(
+    before: bytes,
+) -> None:
+    """Another program's bytes, or noise: the controller keeps their error until it is read."""
+    clock = SystemClock()
+    controller = NewportController(Motor(MECHANICS, clock))
+    assert controller.answer(before) == b""
+    with PtyWire([controller]) as wire, Line("theta_r", wire.port, 57600, clock) as line:
+        stage = NewportStage("theta_r", line, 1, "SMC100", LIMITS, clock)
+        with contextlib.closing(stage):
+            stage.home()
+            assert stage.position_deg() == 0.0
+    assert controller.answer(b"1TE\r\n") == b"1TE@\r\n"
