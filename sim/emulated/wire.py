@@ -130,7 +130,11 @@ _CORRUPT: dict[str, Callable[[bytes], bytes]] = {
 
 
 class PtyWire(Wire):
-    """Serial port on a pseudo-terminal; the master opens `port`."""
+    """Serial port on a pseudo-terminal; the master opens `port`.
+
+    An unplugged port is gone, but no other gets its number before `close`: a driver would send the
+    stop that it still owes to whatever device has that number next.
+    """
 
     def __init__(self, controllers: Sequence[Controller]) -> None:
         self._master, self._slave = os.openpty()
@@ -155,9 +159,19 @@ class PtyWire(Wire):
         with contextlib.suppress(OSError):  # unplugged meanwhile
             os.write(self._master, data)
 
+    def close(self) -> None:
+        """Remove the port, end the thread and give up the port's number."""
+        super().close()
+        with self._descriptors:
+            self._slave = _closed(self._slave)
+
     def _unplug(self) -> None:
         with self._descriptors:
-            for descriptor in (self._master, self._slave):
-                if descriptor >= 0:
-                    os.close(descriptor)
-            self._master = self._slave = -1
+            self._master = _closed(self._master)
+
+
+def _closed(descriptor: int) -> int:
+    """Close a descriptor, -1 for none; return -1."""
+    if descriptor >= 0:
+        os.close(descriptor)
+    return -1
