@@ -102,7 +102,8 @@ class CameraFaults:
     substitute_size: tuple[int, int] | None = None
     refused_controls: set[int] = field(default_factory=set)
     stuck_controls: set[int] = field(default_factory=set)
-    bad_frames: deque[BadFrame] = field(default_factory=deque)  # the next frames
+    # The next frames that reach a buffer; None is a good one.
+    bad_frames: deque[BadFrame | None] = field(default_factory=deque)
     failing: defaultdict[str, deque[int]] = field(default_factory=lambda: defaultdict(deque))
 
     def fail(self, request: str, error: int = errno.EIO, times: int = 1) -> None:
