@@ -1,0 +1,167 @@
+"""Fisher information of candidate geometries about the parameters of a model.
+
+The errors that points share are part of the covariance of the measurements. As unknowns beside the
+parameters, each known beforehand to within one u, they give the same result (generalised least
+squares), and then the information of a design is a sum over its points: quick to update where one
+is added. A point that repeats others averages its own noise; of what they share it says nothing
+new, so that u has a floor which no repetition passes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.data.covariance import Covariance, full_covariance
+from analysis.data.measurements import Measurements, SharedError
+from analysis.fit.relative_scale import FACTOR_NAME, relative_model
+from analysis.fit.search.problem import Problem
+from analysis.models import Model
+from instrument.geometry import Brdf, FloatArray, Geometry, IntArray
+
+# Prior u of a parameter in units of its domain: says next to nothing, and every matrix is regular.
+_PRIOR_U = 10.0
+_MANY = 1e8  # repetitions of every point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Information:
+    """Information of N candidate geometries about K parameters, with S errors that they share.
+
+    names: the parameters. domain: (K,), width of the domain of each, in its unit. rows: (N, K + S),
+    change of each value by a whole domain of each parameter and by one u of each shared error, in
+    units of the independent u of that value.
+    """
+
+    names: tuple[str, ...]
+    domain: FloatArray
+    rows: FloatArray
+
+    @classmethod
+    def of(cls, problem: Problem, x: FloatArray) -> Information:
+        """Information at the parameters x (K,), in their units, of a problem, with its covariance.
+
+        A parameter on a bound where nothing changes by it is moved off the bound a little.
+        """
+        parameters, covariance = problem.model.parameters, problem.covariance
+        inside = problem.off_flat_bounds(x, range(x.size))
+        values = dict(zip((p.name for p in parameters), inside.tolist(), strict=True))
+        gradients = problem.model.gradient(problem.geometry, **values)
+        domain = problem.high - problem.low
+        J = np.stack([gradients[p.name] for p in parameters], axis=1) * domain
+        common = covariance.common
+        shared = common if isinstance(common, np.ndarray) else common.toarray()
+        rows = np.hstack([J, shared]) / covariance.u_independent[:, np.newaxis]
+        return cls(names=tuple(values), domain=domain, rows=rows)
+
+    @property
+    def prior(self) -> FloatArray:
+        """Diagonal of the information before any point is measured, (unknowns,), as in `rows`.
+
+        In units of domains and of shared u, to the power -2.
+        """
+        found = np.ones(self.rows.shape[1])
+        found[: len(self.names)] = _PRIOR_U**-2
+        return found
+
+    def matrix(self, counts: FloatArray) -> FloatArray:
+        """Information (K + S, K + S) of a design that measures each candidate `counts` (N,) times.
+
+        Counts need not be whole numbers.
+        """
+        return np.diag(self.prior) + (self.rows * counts[:, np.newaxis]).T @ self.rows
+
+    def covariance(self, counts: FloatArray) -> FloatArray:
+        """Covariance of all unknowns, (unknowns, unknowns), in units of domains and of shared u.
+
+        The inverse of `matrix`, found from the rows, whose condition is milder.
+        """
+        rows = self.rows * np.sqrt(counts)[:, np.newaxis]
+        R = np.linalg.qr(np.vstack([rows, np.diag(np.sqrt(self.prior))]), mode="r")
+        root = np.linalg.inv(R)
+        return np.asarray(root @ root.T)
+
+    def u(self, counts: FloatArray) -> dict[str, float]:
+        """Standard uncertainty of each parameter, in its unit, by a design of `counts` (N,).
+
+        Of a parameter that the design does not determine it is larger than the domain.
+        """
+        own = np.diag(self.covariance(counts))[: len(self.names)]
+        return dict(zip(self.names, (np.sqrt(own) * self.domain).tolist(), strict=True))
+
+    def least_u(self) -> dict[str, float]:
+        """Standard uncertainty of each parameter that no number of repetitions passes."""
+        return self.u(np.full(len(self.rows), _MANY))
+
+    def weights(self, asked: Iterable[str]) -> FloatArray:
+        """Weights (unknowns,) on the variances of the asked parameters, for one sum of all.
+
+        Each counts in units of the variance that all candidates together would leave: 1 for each
+        is the most that can be reached by measuring every candidate once.
+        """
+        own = np.diag(self.covariance(np.ones(len(self.rows))))
+        found = np.zeros(self.rows.shape[1])
+        for name in asked:
+            found[self.names.index(name)] = 1 / own[self.names.index(name)]
+        return found
+
+
+def assumed_problem(
+    model: Model, x: FloatArray, measurements: Measurements
+) -> tuple[Problem, FloatArray]:
+    """Problem of measurements that have the values of a model at x (K,), and its parameters.
+
+    measurements: N planned points with their uncertainties; their values are replaced, and
+    `u_random` keeps its ratio to them. Relative ones get the factor that a fit gives them.
+    """
+    names = [p.name for p in model.parameters]
+    values = dict(zip(names, x.tolist(), strict=True))
+
+    def brdf(geometry: Geometry) -> FloatArray:
+        return np.asarray(model.kernel(geometry, **values))
+
+    m = _with_values(measurements, brdf(measurements.geometry))
+    covariance = _repeatable_covariance(m, brdf)
+    if not m.relative:
+        return Problem(model, m.geometry, m.brdf, covariance), x
+    scaled = relative_model(model, m.brdf)
+    values[FACTOR_NAME] = 1.0
+    least = {p.name: p.low for p in scaled.parameters}
+    at = np.array([max(values[p.name], least[p.name]) for p in scaled.parameters])
+    return Problem(scaled, m.geometry, m.brdf, covariance), at
+
+
+def _repeatable_covariance(m: Measurements, brdf: Brdf) -> Covariance:
+    """Covariance in which an error that a point alone has is shared by repetitions of that point.
+
+    In that of points measured once it would count as noise, and repetitions would average it.
+    """
+    twice = np.tile(np.arange(m.size), 2)
+    arrays = ("theta_i_deg", "theta_r_deg", "dphi_deg", "brdf", "u_random", "lamp_setting")
+    doubled = replace(
+        m,
+        **{name: getattr(m, name)[twice] for name in arrays},
+        shared=tuple(_taken(error, twice) for error in m.shared),
+    )
+    return full_covariance(doubled, brdf).subset(np.arange(twice.size) < m.size)
+
+
+def _taken(error: SharedError, points: IntArray) -> SharedError:
+    """The same error for the points of these numbers (M,)."""
+    angles = (np.broadcast_to(a, error.group.shape)[points] for a in error.angles_deg)
+    return SharedError(error.name, error.u_relative[points], error.group[points], *angles)
+
+
+def _with_values(m: Measurements, brdf: FloatArray) -> Measurements:
+    """Measurements with values (N,) in 1/sr, and the relative uncertainties that they had."""
+    if m.u_random is None:
+        raise ValueError("u_random is not stated; allowed: a u_random in 1/sr for every point")
+    if np.any(brdf <= 0):
+        at = int(np.argmin(brdf))
+        raise ValueError(
+            f"the model has a BRDF of {brdf[at]:g} 1/sr at theta_i {m.theta_i_deg[at]:g}, theta_r "
+            f"{m.theta_r_deg[at]:g} deg; allowed: more than 0 at every candidate"
+        )
+    return replace(m, brdf=brdf, u_random=np.abs(m.u_random / m.brdf) * brdf)

@@ -1,0 +1,38 @@
+"""Geometries spread over a list: where a model that is wrong anywhere would show it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from instrument.geometry import BoolArray, FloatArray, Geometry, camera_direction, lamp_direction
+
+_SAME = 1e-9  # distances closer than this, squared, are equal
+
+
+def farthest(geometry: Geometry, count: int) -> BoolArray:
+    """Mark `count` of N geometries (N,), each the farthest from those before it.
+
+    The first is the one nearest to the middle of the list. The distance of two is that of their
+    lamps' and of their cameras' directions together. Of equal ones the first in the list counts.
+    """
+    places = _places(geometry)
+    chosen = np.zeros(len(places), dtype=bool)
+    if count == 0:
+        return chosen
+    nearest = np.full(len(places), np.inf)
+    point = int(np.argmin(np.round(_squared(places, places.mean(axis=0)) / _SAME)))
+    for _ in range(count):
+        chosen[point] = True
+        nearest = np.minimum(nearest, _squared(places, places[point]))
+        point = int(np.argmax(np.where(chosen, -1.0, np.round(nearest / _SAME))))
+    return chosen
+
+
+def _places(geometry: Geometry) -> FloatArray:
+    """Unit vectors to lamp and camera, (N, 6), with the lamp in one plane for all."""
+    camera = lamp_direction(geometry.theta_r_deg, geometry.dphi_deg)  # polar angle and azimuth
+    return np.hstack([camera_direction(geometry.theta_i_deg), camera])
+
+
+def _squared(places: FloatArray, to: FloatArray) -> FloatArray:
+    return np.asarray(np.square(places - to).sum(axis=1))
