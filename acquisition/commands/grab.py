@@ -15,7 +15,7 @@ import numpy as np
 from acquisition.commands.setup import require_rig
 from acquisition.engine.exposure.search import ExposureSearch
 from acquisition.live.aiming import Aiming
-from acquisition.live.channel import user_folder
+from acquisition.live.channel import AIM_EVERY_S, user_folder
 from acquisition.live.page_process import live_page
 from acquisition.live.picture import numbers_of
 from acquisition.live.publisher import Publisher
@@ -89,7 +89,7 @@ def aim_camera(
     ):
         out.print(f"{address}\nCtrl-C ends it", highlight=False, soft_wrap=True)
         Aiming(
-            publisher=Publisher(channel, aimed.rig.camera),
+            publisher=Publisher(channel, aimed.rig.camera, every_s=AIM_EVERY_S),
             camera=aimed.rig.camera,
             window=aimed.window,
             take=lambda: aimed.frame(camera),

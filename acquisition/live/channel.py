@@ -24,6 +24,8 @@ COMMANDS = (WATCH, PAUSE, RESUME, ABORT)
 OK = "ok"
 WATCH_EVERY_S = 2.0
 """Time between two commands `watch` of a program that shows pictures."""
+SCAN_EVERY_S, AIM_EVERY_S = 0.5, 0.2
+"""Time between two pictures of a scan, which needs the computer, and of a lens that is turned."""
 MOST_BYTES = 256
 """Of a command or its answer."""
 _ANSWER_S = 1.0  # the scan's side answers from a thread of its own

@@ -22,6 +22,7 @@ from typing import Any
 from acquisition.live.channel import (
     OK,
     PICTURE_FILE,
+    SCAN_EVERY_S,
     SOCKET_FILE,
     STATE_FILE,
     WATCH,
@@ -37,7 +38,6 @@ from instrument.devices import Frame
 
 log = logging.getLogger(__name__)
 
-_EVERY_S = 0.25  # between two publications: a picture costs a few ms of one core
 _WATCHED_S = 2.5 * WATCH_EVERY_S  # after a command `watch`
 
 State = dict[str, Any]
@@ -56,11 +56,14 @@ class Seen:
 class Publisher:
     """Keeps the newest frame, and writes it with the present state while somebody watches.
 
-    folder: that of the channel. camera: tells which counts are saturated.
+    folder: that of the channel. camera: tells which counts are saturated. every_s: time between two
+    publications; each costs a few ms of one core, and as much again in every browser.
     """
 
-    def __init__(self, folder: Path, camera: CameraConfig) -> None:
-        self._folder, self._camera = folder, camera
+    def __init__(
+        self, folder: Path, camera: CameraConfig, *, every_s: float = SCAN_EVERY_S
+    ) -> None:
+        self._folder, self._camera, self._every_s = folder, camera, every_s
         self._state: Callable[[], State] = dict
         self._seen: Seen | None = None
         self._written: Seen | None = None
@@ -116,7 +119,7 @@ class Publisher:
             while not self._over.is_set():
                 if self._is_watched:
                     self._publish()
-                    self._over.wait(_EVERY_S)
+                    self._over.wait(self._every_s)
                 else:
                     self._wake.clear()
                     self._wake.wait()

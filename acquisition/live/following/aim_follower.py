@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from acquisition.live.channel import AIM_EVERY_S
 from acquisition.live.following.board import Board
 from acquisition.live.following.follower import Follower
 from acquisition.live.following.scan_watch import ScanWatch
@@ -30,6 +31,8 @@ _ENDED = "The camera is not being aimed any more"
 
 class AimFollower(Follower):
     """Follower of the process that has this channel, and takes pictures for somebody to see."""
+
+    EVERY_S = AIM_EVERY_S
 
     def __init__(self, scan: ScanWatch, board: Board) -> None:
         super().__init__(scan, board)

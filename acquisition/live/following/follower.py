@@ -7,6 +7,7 @@ import time
 from abc import abstractmethod
 from collections.abc import Sequence
 
+from acquisition.live.channel import SCAN_EVERY_S
 from acquisition.live.following.board import Board
 from acquisition.live.following.messages import rounded
 from acquisition.live.following.scan_watch import ScanWatch
@@ -14,13 +15,16 @@ from acquisition.plan.step_count import StepCount
 from instrument.closeable import Closeable
 from instrument.text.terminal_safe import escape_control_characters
 
-_EVERY_S, _UNWATCHED_S = 0.2, 1.0  # between two looks, with and without a browser
+_UNWATCHED_S = 1.0  # between two looks without a browser
 _FAILED = "The page has failed, the scan goes on without it; start it again with gonio watch"
-_IDLE = 9.0  # time without work for each time of work: a long run takes longer to reduce
+_IDLE = 19.0  # time without work for each time of work: a long run takes longer to reduce
 
 
 class Follower(Closeable):
     """Follower of what is measured; `scan` watches over the process that measures."""
+
+    EVERY_S = SCAN_EVERY_S
+    """Time between two looks while a browser is there, in s."""
 
     def __init__(self, scan: ScanWatch, board: Board) -> None:
         self.scan, self._board = scan, board
@@ -77,7 +81,7 @@ class Follower(Closeable):
                 begun_s = time.thread_time()
                 self.poll()
                 used_s = time.thread_time() - begun_s
-                pause_s = max(_EVERY_S if self._board.readers else _UNWATCHED_S, _IDLE * used_s)
+                pause_s = max(self.EVERY_S if self._board.readers else _UNWATCHED_S, _IDLE * used_s)
         except Exception as error:
             self.put_progress(state="lost", text=f"{_FAILED}: {error!r}")
             raise

@@ -12,7 +12,7 @@ from acquisition.results.reduction import Reduced
 from instrument.closeable import Closeable
 from instrument.config.load import Loaded
 
-SHARE = 0.1  # of one core, on average: a scan has the machine
+SHARE = 0.05  # of one core, on average: a scan has the machine
 MODEL = "model"
 
 

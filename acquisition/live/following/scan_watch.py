@@ -22,7 +22,7 @@ from acquisition.live.following.curves import SIGNS
 
 _AXES = {"theta_i": "lamp", "dphi": "azimuth", "theta_r": "camera"}
 _NEVER_S = -math.inf
-_OLD_S = 2 * WATCH_EVERY_S  # of a state: a scan that is watched writes it four times a second
+_OLD_S = 2 * WATCH_EVERY_S  # of a state: a scan that is watched writes it twice a second
 _RIG, _PICTURE = "rig", "picture"
 _UNKNOWN = {"axes": [], "lamp": "unknown"}
 

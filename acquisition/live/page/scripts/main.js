@@ -20,7 +20,9 @@ import { Selection } from './selection.js';
 import { follow } from './stream.js';
 import { useTheme } from './theme.js';
 
-const TOGETHER_MS = 100; // messages that arrive within this time are shown at once
+const TOGETHER_MS = 50; // messages that arrive within this time are shown at once
+const EVERY_MS = 500; // between two drawings in a scan, which needs the computer; AIMING_MS: of a lens
+const AIMING_MS = 150;
 
 const scan = new Scan();
 const selection = new Selection(showAll);
@@ -30,12 +32,15 @@ const legend = new Legend(showAll);
 const curves = () => legend.visible(curvesOf(scan));
 const chart = new Chart(by('chart'), (step) => selection.select(step));
 let waiting = null;
+let shownAt = -Infinity;
 
 function showSoon() {
+  const due = shownAt + (scan.aiming ? AIMING_MS : EVERY_MS) - performance.now();
   waiting ??= setTimeout(() => {
     waiting = null;
+    shownAt = performance.now();
     showAll();
-  }, TOGETHER_MS);
+  }, Math.max(TOGETHER_MS, due));
 }
 
 function showAll() {
