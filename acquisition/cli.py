@@ -229,12 +229,16 @@ def report(
     pdf: Annotated[
         bool, typer.Option("--pdf", help="Print it to report.pdf, too; needs a Chromium.")
     ] = False,
+    figures: Annotated[
+        Path | None,
+        typer.Option("--figures", help="New folder for its figures as SVG, their data as CSV."),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Fit a run again and rewrite its table and its report."""
     from acquisition.commands.scan import report_run
 
-    report_run(folder, pdf=pdf, as_json=json)
+    report_run(folder, pdf=pdf, figures=figures, as_json=json)
 
 
 for command in (export, compare, runs):

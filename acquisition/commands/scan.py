@@ -12,6 +12,7 @@ from pathlib import Path
 
 from acquisition.commands.determinable import Determinable
 from acquisition.commands.fit_status import no_fit_reported, print_json, require_result
+from acquisition.commands.outcomes.figures import require_new_folder, write_figures
 from acquisition.commands.outcomes.pdf import browser, print_pdf
 from acquisition.commands.scan_session import scan
 from acquisition.commands.views import print_outcome, print_plan
@@ -127,14 +128,18 @@ def resume_run(folder: Path, *, yes: bool, as_json: bool, live: bool = False) ->
             _finish(record, loaded, as_json)
 
 
-def report_run(folder: Path, *, pdf: bool = False, as_json: bool) -> None:
+def report_run(
+    folder: Path, *, pdf: bool = False, figures: Path | None = None, as_json: bool
+) -> None:
     """Fit a run again and write its table and report anew; opens no device.
 
-    `pdf`: print the report to a PDF file, too.
+    `pdf`: print the report to a PDF file, too. `figures`: new folder for its figures.
     """
     printer = browser() if pdf else None
+    if figures is not None:
+        require_new_folder(figures)
     with orderly_end(), Record.open(folder) as record:
-        _finish(record, load_run_inputs(record), as_json, printer)
+        _finish(record, load_run_inputs(record), as_json, printer, figures)
 
 
 def show_plan(protocol_path: Path, rig_path: Path | None, as_json: bool) -> None:
@@ -161,11 +166,17 @@ def _plan_json(loaded: Loaded, plan: Plan) -> dict[str, object]:
     }
 
 
-def _finish(record: Record, loaded: Loaded, as_json: bool, printer: str | None = None) -> None:
+def _finish(
+    record: Record,
+    loaded: Loaded,
+    as_json: bool,
+    printer: str | None = None,
+    figures: Path | None = None,
+) -> None:
     """Fit, report and print the outcome. The scan is over: a Ctrl-C costs no reading.
 
-    `printer`: browser that prints the report to a PDF file. Raises, after all files are written, as
-    `fit_status.require_result` does.
+    `printer`: browser that prints the report to a PDF file. `figures`: folder for its figures.
+    Raises, after all files are written, as `fit_status.require_result` does.
     """
     try:
         with (
@@ -189,6 +200,11 @@ def _finish(record: Record, loaded: Loaded, as_json: bool, printer: str | None =
     if printer is not None:
         printed = print_pdf(outcome.report, printer)
         console.print(f"report as PDF: {printed}", highlight=False, soft_wrap=True)
+    if figures is not None:
+        from analysis.report.figure_data import figure_files
+
+        written = write_figures(figures, figure_files(outcome.content))
+        console.print(written, highlight=False, soft_wrap=True)
     require_result(outcome.fit, f"{record.folder}: {outcome.state}")
 
 

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from acquisition.results.fitting import Fitted
 from acquisition.results.report_inputs import candidates
-from analysis.report.charts import brdf_drawing, model_handles
 from analysis.report.data import ReportData
+from analysis.report.figures.charts import brdf_drawing, model_handles
 from analysis.report.style import drawn_in
 from analysis.report.sweeps import group_sweeps
 from instrument.errors import NoMeasurement

@@ -13,7 +13,7 @@ from acquisition.results.measurements_csv import measurements_csv
 from acquisition.results.reduction import reduced_run
 from acquisition.results.report_inputs import report_data
 from acquisition.results.summary import headline, notes, parameters_of, scan_state
-from analysis.report.data import Parameter
+from analysis.report.data import Parameter, ReportData
 from analysis.report.page import write_report
 from instrument.config.load import Loaded
 from instrument.errors import NoMeasurement, StorageError
@@ -25,7 +25,7 @@ from instrument.text.atomic_file import write_whole
 class Outcome:
     """Results to print; `fit` is the content of fit.json.
 
-    state: the scan is complete, or what is missing of it.
+    state: the scan is complete, or what is missing of it. content: that of the report.
     """
 
     state: str
@@ -34,6 +34,7 @@ class Outcome:
     notes: tuple[str, ...]
     fit: dict[str, object]
     report: Path
+    content: ReportData
 
 
 def finish(record: Record, loaded: Loaded) -> Outcome:
@@ -46,31 +47,19 @@ def finish(record: Record, loaded: Loaded) -> Outcome:
         raise NoMeasurement(f"no geometry has been measured yet: {scan_state(record)}")
     fitted = fit_run(reduced, loaded)
     u_brdf, parts = fitted.u_brdf(reduced), fitted.parts(reduced)
-    outcome = Outcome(
-        scan_state(record),
-        headline(fitted),
-        () if fitted.chosen is None else parameters_of(fitted.chosen),
-        notes(reduced, fitted, record, loaded),
-        fitted.as_json(),
-        record.folder / "report.html",
-    )
+    said, remarks, fit = headline(fitted), notes(reduced, fitted, record, loaded), fitted.as_json()
     with _recovery_named(record.folder):
         table = measurements_csv(reduced, u_brdf, parts, loaded)
         write_whole(record.folder / "measurements.csv", table)
-        write_whole(record.folder / "fit.json", json.dumps(outcome.fit, indent=2, allow_nan=False))
+        write_whole(record.folder / "fit.json", json.dumps(fit, indent=2, allow_nan=False))
     content = report_data(
-        reduced,
-        fitted,
-        record,
-        loaded,
-        u_brdf=u_brdf,
-        parts=parts,
-        headline=outcome.headline,
-        notes=outcome.notes,
+        reduced, fitted, record, loaded, u_brdf=u_brdf, parts=parts, headline=said, notes=remarks
     )
+    report = record.folder / "report.html"
     with _recovery_named(record.folder):
-        write_report(outcome.report, content)
-    return outcome
+        write_report(report, content)
+    parameters = () if fitted.chosen is None else parameters_of(fitted.chosen)
+    return Outcome(scan_state(record), said, parameters, remarks, fit, report, content)
 
 
 @contextmanager

@@ -9,7 +9,8 @@ import numpy as np
 from analysis.comparison.agreement import DISAGREE
 from analysis.comparison.compared import Compared, level_text
 from analysis.data.sweeps import Sweep, signed_view, sweeps
-from analysis.report.charts import MAX_SWEEPS, margins
+from analysis.report.figures.charts import MAX_SWEEPS, margins
+from analysis.report.figures.value_axis import set_symmetric_axis
 from analysis.report.style import (
     BAND,
     CSS,
@@ -23,7 +24,6 @@ from analysis.report.style import (
     svg_of,
     table_html,
 )
-from analysis.report.value_axis import set_symmetric_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from analysis.report import charts
 from analysis.report.data import ReportData
+from analysis.report.figures import charts
+from analysis.report.figures.hemisphere import HemisphereMap
 from analysis.report.style import escaped
 from analysis.report.sweeps import PlottedSweep
 from analysis.report.swept_axis import LAMP, VIEW
@@ -132,6 +133,19 @@ def polar_caption(data: ReportData, sweeps: Sequence[PlottedSweep], quantity: st
     )
     caption += " Arrows: direction of the light." if any(s.in_plane for s in sweeps) else ""
     return caption + (" Flagged points are left out." if data.flagged.any() else "")
+
+
+def hemisphere_caption(data: ReportData, maps: Sequence[HemisphereMap], quantity: str) -> str:
+    """Caption of the maps of the hemisphere."""
+    caption = (
+        f"Colour: {quantity}. Each dot is a measured direction, seen from above: the distance "
+        "from the centre is sin θᵣ, with rings at θᵣ = 30°, 60° and 90°; the azimuth Δφ counts "
+        "from the lamp’s side on the right. ☆: direction of the lamp. Nothing is interpolated."
+    )
+    incidences = len({round(float(a), 1) for a in data.theta_i_deg})
+    if len(maps) < incidences:
+        caption += f" {len(maps)} of {incidences} incidences are shown."
+    return caption + (" Crosses: flagged points." if data.flagged.any() else "")
 
 
 def _scaled(data: ReportData) -> str:

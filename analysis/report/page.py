@@ -5,41 +5,31 @@ The entry point is `write_report`. Every text from the record is escaped.
 
 from __future__ import annotations
 
-import base64
 import math
-import re
-import struct
 from pathlib import Path
 
-from analysis.report import captions, charts
-from analysis.report.budget_chart import budget_chart, with_budget
-from analysis.report.data import Candidate, Parameter, ReportData, Rows
-from analysis.report.polar import polar_chart
+from analysis.report import captions
+from analysis.report.data import ReportData, Rows
+from analysis.report.figure_list import budget_figure, chart_figures
+from analysis.report.models_html import candidates_html, verdict_html
+from analysis.report.pictures_html import pictures_html
+from analysis.report.point_texts import points_html
 from analysis.report.style import (
     CSS,
+    HOVER,
     escaped,
-    figure_html,
     format_value,
     html_page,
     row_html,
-    short_number,
     table_html,
 )
 from analysis.report.sweeps import PlottedSweep, group_sweeps
-from analysis.report.swept_axis import VIEW
-from instrument.record.reading import Preview
 from instrument.text.atomic_file import write_whole
 
-_STATES = {
-    "adequate": ("adequate", "✔ Adequate: the model explains the data"),
-    "none adequate": ("warning", "✘ No model explains the data within their uncertainty"),
-    "not identifiable": ("warning", "? The data do not determine every parameter"),
-}
 _NO_TILE = (
     "No white tile was measured, so there is no BRDF: the radiance is relative, in counts per "
     "second of this camera, lamp and lens. Only its dependence on angle is meaningful."
 )
-_PNG_HEADER = struct.Struct(">8s4x4sII")
 
 
 def write_report(path: Path, data: ReportData) -> None:
@@ -52,16 +42,17 @@ def report_html(data: ReportData) -> str:
     sweeps = group_sweeps(data)
     body = [
         _head(data, sweeps),
-        _verdict(data),
+        verdict_html(data),
         _attention(data),
         _charts(data, sweeps),
-        _candidates(data),
+        candidates_html(data),
         _flagged(data),
         _budget(data, sweeps),
-        _pictures(data.previews),
+        pictures_html(data.previews),
         _facts(data),
+        points_html(data, sweeps) if sweeps else "",
     ]
-    return html_page(escaped(data.title), CSS, body)
+    return html_page(escaped(data.title), CSS, body, HOVER if sweeps else "")
 
 
 def _number(value: float | None, form: str) -> str:
@@ -77,40 +68,6 @@ def _head(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
     return "\n".join([*lines, f'<p class="soft">{captions.counts(data, sweeps)}</p>\n</header>'])
 
 
-def _verdict(data: ReportData) -> str:
-    kind, state = _STATES.get(data.verdict_kind, ("", ""))
-    headline, *more = data.verdict or ("No model was fitted.",)
-    values = [
-        f"<div><dt>{_name(p.name)}</dt><dd>{_value_of(p)}</dd></div>"
-        for candidate in data.candidates
-        for p in candidate.parameters
-        if candidate.chosen
-    ]
-    return "\n".join(
-        [
-            f'<section id="verdict" class="verdict {kind}">',
-            f'<div class="state">{state}</div>' if state else "",
-            f'<p class="headline">{_name(headline, "+/_")}</p>',
-            *(f"<p>{escaped(sentence)}</p>" for sentence in more),
-            f'<dl class="values">{"".join(values)}</dl>' if values else "",
-            "</section>",
-        ]
-    )
-
-
-def _name(raw: str, joints: str = "+/") -> str:
-    """Escape a text with names of models or parameters, which may wrap after the joints."""
-    return re.sub(rf"(?<=\w)[{joints}](?=\w)", r"\g<0><wbr>", escaped(raw))
-
-
-def _value_of(parameter: Parameter) -> str:
-    if parameter.u is None and parameter.interval is not None:
-        low, high = (short_number(end, 4) for end in parameter.interval)
-        unit = f"\u00a0{parameter.unit}" if parameter.unit else ""
-        return escaped(f"not determined, in [{low}, {high}]{unit}")
-    return escaped(format_value(parameter.value, parameter.u, parameter.unit))
-
-
 def _attention(data: ReportData) -> str:
     notes = [*data.notes, *((_NO_TILE,) if data.flags and not data.has_brdf else ())]
     if not notes:
@@ -120,69 +77,10 @@ def _attention(data: ReportData) -> str:
 
 
 def _charts(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
-    if not sweeps:
+    figures = chart_figures(data, sweeps)
+    if not figures:
         return '<h2 id="shape">Measured values</h2>\n<p>No geometry has a value to plot.</p>'
-    name = "BRDF" if data.has_brdf else "Radiance"
-    quantity = data.quantity
-    figures = [
-        '<h2 id="shape">Shape of the reflection</h2>',
-        figure_html(
-            charts.shape_charts(sweeps, quantity),
-            f"shape against the {sweeps[0].axis.name}",
-            captions.shape_caption(data, sweeps, quantity),
-        ),
-        f'<h2 id="brdf">{captions.brdf_title(sweeps, name)}</h2>',
-        figure_html(
-            [charts.brdf_chart(sweeps, quantity)], quantity, captions.panel_caption(data, sweeps)
-        ),
-    ]
-    if sweeps[0].axis is VIEW:
-        polar = [polar_chart(sweeps, quantity)]
-        caption = captions.polar_caption(data, sweeps, quantity)
-        figures.append(f'<h2 id="polar">{name} around the sample</h2>')
-        figures.append(figure_html(polar, f"{quantity}, polar", caption))
-    return "\n".join(figures)
-
-
-def _candidates(data: ReportData) -> str:
-    if not data.candidates:
-        return ""
-    known = [c.bic for c in data.candidates if c.bic is not None and math.isfinite(c.bic)]
-    best = min(known, default=None)
-    head = ("Model", "Parameters ± u (k = 1)", "#Residual, rms", "#Reduced χ²", "#ΔBIC")
-    tag = "✔ chosen" if data.verdict_kind == "adequate" else "best candidate"
-    table = table_html(head, (_candidate(c, best, tag) for c in data.ranked), "wide candidates")
-    return (
-        f'<h2 id="candidates">Models compared</h2>\n{table}\n'
-        '<p class="soft">Residual: relative to the mean. Reduced χ² near 1: the model agrees with '
-        "the data within their uncertainty. ΔBIC: difference from the lowest BIC, which includes a "
-        "penalty for each parameter. Brackets: 95 % interval. Models that are not chosen are shown "
-        "with the values that fit best, and with u where they agree with the data.</p>"
-    )
-
-
-def _candidate(candidate: Candidate, best_bic: float | None, tag: str) -> str:
-    above = math.nan
-    if candidate.bic is not None and best_bic is not None:
-        above = candidate.bic - best_bic
-    note = f'<br><span class="tag">{tag}</span>' if candidate.chosen else ""
-    if not candidate.converged:
-        note += f'<br><span class="soft">did not converge: {escaped(candidate.message)}</span>'
-    elif not candidate.agrees:
-        note += '<br><span class="soft">does not fit</span>'
-    parameters = "".join(
-        f'<span class="parameter"><span class="name">{escaped(p.name)}</span> {_value_of(p)}</span>'
-        for p in candidate.parameters
-    )
-    rms = candidate.rms_relative
-    cells = (
-        _name(candidate.name) + note,
-        parameters,
-        "#" + (f"{short_number(100 * rms, 3)} %" if math.isfinite(rms) else "—"),
-        "#" + short_number(candidate.reduced_chi2, 3),
-        "#" + (_number(above, ".1f") if abs(above) < 1000 else short_number(above, 3)),
-    )
-    return row_html(cells, "chosen" if candidate.chosen else "")
+    return "\n".join(f'<h2 id="{f.name}">{f.heading}</h2>\n{f.html()}' for f in figures)
 
 
 def _flagged(data: ReportData) -> str:
@@ -211,14 +109,11 @@ def _budget(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
         row_html((escaped(name), f"#{_percent(u)}", f"#{_number(share, '.0f')} %", _bar(share)))
         for name, u, share in data.budget
     )
-    drawn, known = "", with_budget(data, sweeps)
-    if known:
-        label, caption = "uncertainty by source", captions.budget_caption(known)
-        drawn = figure_html([budget_chart(data, known)], label, caption)
+    figure = budget_figure(data, sweeps)
     return (
         '<h2 id="budget">Uncertainty budget</h2>\n'
         '<p class="soft">Standard uncertainty (k = 1) of a point, relative to its value.</p>\n'
-        + drawn
+        + (figure.html() if figure else "")
         + table_html(("Source", "#Relative u, median", "#Share of variance", ""), rows)
     )
 
@@ -234,48 +129,6 @@ def _bar(share: float) -> str:
         '<rect width="100" height="6" fill="#eee"/>'
         f'<rect width="{width:.1f}" height="6" fill="#555"/></svg>'
     )
-
-
-def _pictures(previews: tuple[Preview, ...]) -> str:
-    if not previews:
-        return ""
-    return (
-        '<h2 id="pictures">Camera pictures</h2>\n'
-        '<p class="soft">Outline: the window of averaged pixels, which shows the same area of the '
-        'sample at every angle.</p>\n<div class="pictures">'
-        + "".join(map(_picture, previews))
-        + "</div>"
-    )
-
-
-def _picture(preview: Preview) -> str:
-    caption = f"<figcaption>{escaped(preview.caption)}</figcaption>"
-    size = _png_size(preview.png)
-    if size is None:
-        return f"<figure><p>This picture cannot be read.</p>{caption}</figure>"
-    # Whole numbers are the centres of pixels in the record, and their edges in SVG.
-    corners = " ".join(
-        f"{x + 0.5:.2f},{y + 0.5:.2f}"
-        for x, y in preview.polygon
-        if math.isfinite(x) and math.isfinite(y)
-    )
-    outline = f'<polygon points="{corners}" fill="none" vector-effect="non-scaling-stroke"'
-    png = base64.b64encode(preview.png).decode("ascii")
-    return (
-        f'<figure><svg viewBox="0 0 {size[0]} {size[1]}" role="img" aria-label="camera picture">'
-        f'<image width="{size[0]}" height="{size[1]}" href="data:image/png;base64,{png}"/>'
-        f'{outline} stroke="#000" stroke-width="4"/>{outline} stroke="#fff" stroke-width="1.8"/>'
-        f"</svg>{caption}</figure>"
-    )
-
-
-def _png_size(png: bytes) -> tuple[int, int] | None:
-    """Width and height in pixels from the header of a PNG; None for other data."""
-    if len(png) < _PNG_HEADER.size:
-        return None
-    signature, chunk, width, height = _PNG_HEADER.unpack_from(png)
-    known = signature == b"\x89PNG\r\n\x1a\n" and chunk == b"IHDR" and width and height
-    return (width, height) if known else None
 
 
 def _facts(data: ReportData) -> str:

@@ -1,19 +1,27 @@
-"""Style of the report: colours and markers of the charts, number format, style sheet.
+"""Style of the report: colours and markers of the charts, number format, parts of a page.
 
-Suitable for screens and for black-and-white printers.
+Suitable for screens and for black-and-white printers; the style sheet is assets/report.css.
 """
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import html
 import io
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from decimal import Decimal
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
+import numpy as np
+
+from instrument.geometry import FloatArray, IntArray
+
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 F = TypeVar("F", bound="Figure")
@@ -31,13 +39,19 @@ _DASHES: tuple[Dashes, ...] = (
 )
 INK, GREY, GRID, BAND = "#222222", "#666666", "#DDDDDD", "#ECECEC"
 
-# The page may load nothing and run nothing, also if a text of a run should ever get past `escaped`.
+# The page may load nothing and run nothing but its own script, also if a text of a run should ever
+# get past `escaped`.
 _POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
     "form-action 'none'"
 )
+_ASSETS = Path(__file__).parent / "assets"
+CSS = (_ASSETS / "report.css").read_text(encoding="utf-8")
+HOVER = (_ASSETS / "hover.js").read_text(encoding="utf-8")
 
-_WIDTH_IN = 9.6
+WIDTH_IN = 9.6
+NARROW_IN = 4.3
+"""Widths of a chart on a screen or on paper, and on a phone."""
 
 _FLOAT_DIGITS = 15  # significant decimal digits that every float keeps
 _PLAIN = (-6, 6)  # powers of ten of the first digit that are written as plain decimals
@@ -79,11 +93,27 @@ def style_of(incidence: int) -> tuple[str, str, Dashes]:
     )
 
 
+class Marks(NamedTuple):
+    """Points of a chart that show their values: places (P,) on its axes, and numbers (P,)."""
+
+    axes: Axes
+    x: FloatArray
+    y: FloatArray
+    numbers: IntArray
+
+
+Draw = Callable[["Figure"], Sequence[Marks] | None]
+
+
 class Drawing(NamedTuple):
-    """Chart that is not drawn yet: its height in inches, and what draws it into a figure."""
+    """Chart that is not drawn yet: its height, what draws it into a figure, and its width.
+
+    Both in inches.
+    """
 
     height_in: float
-    draw: Callable[[Figure], None]
+    draw: Draw
+    width_in: float = WIDTH_IN
 
 
 def drawn_in(kind: type[F], drawing: Drawing) -> F:
@@ -91,36 +121,64 @@ def drawn_in(kind: type[F], drawing: Drawing) -> F:
     import matplotlib as mpl
 
     with mpl.rc_context(_SETTINGS):
-        figure = kind(figsize=(_WIDTH_IN, drawing.height_in))
+        figure = kind(figsize=(drawing.width_in, drawing.height_in))
         drawing.draw(figure)
     return figure
 
 
-def svg_of(height_in: float, draw: Callable[[Figure], None], name: str) -> str:
-    """Draw a figure as an SVG element whose ids begin with `name`; reproducible byte by byte.
+def svg_of(height_in: float, draw: Draw, name: str) -> str:
+    """Draw a figure as an SVG element whose ids begin with `name`; reproducible byte by byte."""
+    return embedded_svg(Drawing(height_in, draw), name)
 
-    Matplotlib's settings are changed only while drawing.
-    """
+
+def embedded_svg(drawing: Drawing, name: str) -> str:
+    """Return a chart as an SVG element for a page: without fixed size, with unique ids."""
+    svg, marks = _drawn(drawing, transparent=True)
+    svg = svg[svg.index("<svg") :].replace("xlink:href=", "href=")
+    head, end, body = svg.partition(">")
+    head = re.sub(r' (width|height|xmlns:xlink)="[^"]*"', "", head)
+    body = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", body)
+    return head + end + body.replace("</svg>", f"{marks}</svg>")
+
+
+def svg_file(drawing: Drawing) -> str:
+    """Return a chart as the text of an SVG file, on white."""
+    return _drawn(drawing, transparent=False)[0]
+
+
+def _drawn(drawing: Drawing, *, transparent: bool) -> tuple[str, str]:
+    """Draw a chart; return it and its marks as SVG. Matplotlib is set only meanwhile."""
     import matplotlib as mpl
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
     with mpl.rc_context(_SETTINGS):
-        figure = Figure(figsize=(_WIDTH_IN, height_in))
+        figure = Figure(figsize=(drawing.width_in, drawing.height_in))
         FigureCanvasSVG(figure)
-        draw(figure)
+        marks = drawing.draw(figure) or ()
         text = io.StringIO()
         nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-        figure.savefig(text, format="svg", transparent=True, metadata=nothing)
-    return _embedded(text.getvalue(), name)
+        figure.savefig(text, format="svg", transparent=transparent, metadata=nothing)
+        return text.getvalue(), _marks_svg(marks, drawing.height_in)
 
 
-def _embedded(svg: str, name: str) -> str:
-    """The SVG for use inside a page: without header and fixed size, with unique ids."""
-    svg = svg[svg.index("<svg") :].replace("xlink:href=", "href=")
-    head, end, body = svg.partition(">")
-    head = re.sub(r' (width|height|xmlns:xlink)="[^"]*"', "", head)
-    return head + end + re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", body)
+def _marks_svg(marks: Sequence[Marks], height_in: float) -> str:
+    """Circles at the points, in the SVG's points (72 an inch, downwards); those outside left out.
+
+    Each has the number of its point as `data-p`.
+    """
+    circles = []
+    for axes, x, y, numbers in marks:
+        with np.errstate(all="ignore"):
+            at = axes.transData.transform(np.column_stack([x, y])) * (72.0 / axes.figure.dpi)
+        box = axes.get_window_extent().padded(1.0)
+        low, high = (np.asarray(end) * (72.0 / axes.figure.dpi) for end in (box.min, box.max))
+        inside = np.all(np.isfinite(at) & (at >= low) & (at <= high), axis=1)
+        circles += [
+            f'<circle cx="{left:.1f}" cy="{72.0 * height_in - up:.1f}" data-p="{number}"/>'
+            for (left, up), number in zip(at[inside], numbers[inside], strict=True)
+        ]
+    return f'<g class="marks">{"".join(circles)}</g>' if circles else ""
 
 
 def format_value(value: float, u: float | None, unit: str = "") -> str:
@@ -142,6 +200,18 @@ def format_value(value: float, u: float | None, unit: str = "") -> str:
     power = 0 if plain else largest
     text = " ± ".join(_rounded(number, first - 1, power) for number in (value, u))
     return f"{text}{suffix}" if plain else f"({text}){_times_ten_to(power)}{suffix}"
+
+
+def interval_text(low: float, high: float) -> tuple[str, str]:
+    """Format the ends of an interval, with equal decimals and two digits of half its width."""
+    half = (high - low) / 2
+    if not (math.isfinite(half) and half > 0):
+        return _general(low, 4), _general(high, 4)
+    last = _exponent(half, 2) - 1
+    if not _PLAIN[0] <= last <= 0 or max(abs(low), abs(high)) >= 10.0 ** _PLAIN[1]:
+        digits = max(2, _exponent(max(abs(low), abs(high)), 2) - last + 1)
+        return _general(low, min(digits, 15)), _general(high, min(digits, 15))
+    return _rounded(low, last, 0), _rounded(high, last, 0)
 
 
 def short_number(value: float | None, digits: int) -> str:
@@ -172,29 +242,52 @@ def _times_ten_to(power: int) -> str:
 
 def escaped(raw: str) -> str:
     """Return a text from outside as HTML and XML; characters that cannot be shown are replaced."""
-    visible = "".join(c if c.isprintable() or c in "\n\t\u00a0" else "\ufffd" for c in raw)
-    return html.escape(visible)
+    return html.escape(visible(raw))
 
 
-def html_page(title: str, css: str, body: Iterable[str]) -> str:
-    """Page of the parts of its body that are not empty; all in HTML."""
+def visible(raw: str) -> str:
+    """Return a text from outside with characters that cannot be shown replaced."""
+    return "".join(c if c.isprintable() or c in "\n\t\u00a0" else "\ufffd" for c in raw)
+
+
+def html_page(title: str, css: str, body: Iterable[str], script: str = "") -> str:
+    """Page of the parts of its body that are not empty; all in HTML.
+
+    `script`: the only one that the page may run, by its hash (Content Security Policy level 3).
+    """
+    policy = _POLICY
+    if script:
+        digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
+        policy += f"; script-src 'sha256-{digest}'"
+        script = f"\n<script>{script}</script>"
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         f"<title>{title}</title>\n<style>{css}</style>\n</head>\n<body>\n"
         + "\n".join(part for part in body if part)
-        + "\n</body>\n</html>\n"
+        + f"{script}\n</body>\n</html>\n"
     )
 
 
-def figure_html(drawings: list[str], label: str, caption: str) -> str:
-    """Figure of drawings in SVG, labelled for readers of a screen, and its caption in HTML."""
+def figure_html(
+    drawings: Sequence[str], label: str, caption: str, narrow: Sequence[str] = ()
+) -> str:
+    """Figure of drawings in SVG, labelled for readers of a screen, and its caption in HTML.
+
+    `narrow`: the same, drawn for a phone.
+    """
+    if narrow:
+        charts = _chart_html(drawings, label, " broad") + _chart_html(narrow, label, " narrow")
+    else:
+        charts = _chart_html(drawings, label)
+    return f"<figure>\n{charts}<figcaption>{caption}</figcaption>\n</figure>"
+
+
+def _chart_html(drawings: Sequence[str], label: str, width: str = "") -> str:
     named = f'<svg role="img" aria-label="{escaped(label)}" '
     drawn = "".join(svg.replace("<svg ", named, 1) for svg in drawings)
-    return (
-        f'<figure>\n<div class="chart">{drawn}</div><figcaption>{caption}</figcaption>\n</figure>'
-    )
+    return f'<div class="chart{width}">{drawn}</div>'
 
 
 def table_html(head: Iterable[str], rows: Iterable[str], kind: str = "wide") -> str:
@@ -210,96 +303,3 @@ def row_html(cells: Iterable[str], style: str = "", cell: str = "td") -> str:
         for c in cells
     )
     return f'<tr class="{style}">{"".join(made)}</tr>' if style else f"<tr>{''.join(made)}</tr>"
-
-
-CSS = """
-:root { --ink: #1d1d1f; --soft: #5c5f66; --rule: #d4d6da; --wash: #f5f6f7; }
-* { box-sizing: border-box; }
-body { margin: 0 auto; max-width: 1000px; padding: 28px 24px 48px; color: var(--ink);
-  background: #fff; font: 16px/1.45 system-ui, "Segoe UI", "Helvetica Neue", Arial, "DejaVu Sans",
-  sans-serif; }
-h1 { font-size: 28px; line-height: 1.2; margin: 0 0 4px; }
-h2 { font-size: 20px; margin: 36px 0 8px; padding-top: 10px; border-top: 1px solid var(--rule); }
-h3 { font-size: 16px; margin: 18px 0 6px; }
-p { margin: 6px 0; }
-.sample { font-size: 18px; margin: 0; }
-.text, .soft { color: var(--soft); }
-.text { white-space: pre-line; }
-.verdict { margin: 18px 0; padding: 14px 20px 16px; border: 2px solid #6b7280;
-  border-left-width: 12px; background: var(--wash); border-radius: 4px; }
-.verdict.adequate { border-color: #00734f; background: #eef8f4; }
-.verdict.warning { border-color: #c05a00; background: #fdf4ea; }
-.verdict .state { font-size: 13px; font-weight: 700; letter-spacing: .06em;
-  text-transform: uppercase; }
-.verdict .headline { font-size: 21px; font-weight: 600; line-height: 1.3; margin: 2px 0 6px; }
-.values { display: flex; flex-wrap: wrap; gap: 10px 36px; margin: 12px 0 4px; }
-.values div { line-height: 1.25; }
-.values dt { color: var(--soft); font-size: 14px; }
-.values dd { margin: 0; font-size: 20px; font-weight: 600; font-variant-numeric: tabular-nums; }
-dl.values { margin-bottom: 0; }
-.attention { margin: 12px 0; padding: 8px 16px; border-left: 4px solid #c05a00; }
-.attention ul { margin: 0; padding-left: 20px; }
-figure { margin: 10px 0 18px; }
-figure > svg, .chart > svg { display: block; width: 100%; height: auto; }
-figure > svg text, .chart > svg text { font-family: system-ui, "Segoe UI", "Helvetica Neue", Arial,
-  "DejaVu Sans", sans-serif !important; }
-figcaption { color: var(--soft); font-size: 14px; margin-top: 4px; }
-figcaption b { color: var(--ink); }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; width: 100%; font-size: 15px; }
-th, td { text-align: left; vertical-align: top; padding: 6px 14px 6px 8px;
-  border-bottom: 1px solid var(--rule); }
-th { font-size: 13px; color: var(--soft); font-weight: 600; border-bottom: 2px solid var(--soft); }
-td.number, th.number { text-align: right; white-space: nowrap;
-  font-variant-numeric: tabular-nums; }
-tr.chosen td { background: #eef8f4; border-top: 2px solid #00734f;
-  border-bottom: 2px solid #00734f; }
-tr.chosen td:first-child { font-weight: 700; border-left: 8px solid #00734f; }
-.parameter { display: block; white-space: nowrap; font-variant-numeric: tabular-nums; }
-.name { color: var(--soft); }
-.tag { display: inline-block; font-size: 12px; font-weight: 700; color: #00734f; }
-td svg.share { display: block; width: 220px; height: 14px; }
-.pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(270px, 1fr));
-  gap: 16px; }
-.pictures figure { margin: 0; break-inside: avoid; }
-.pictures svg { border: 1px solid var(--rule); background: #000; }
-.pictures image { image-rendering: pixelated; }
-.facts { display: grid; grid-template-columns: 1fr 1fr; gap: 0 40px; }
-.facts table { font-size: 14px; }
-body { overflow-wrap: break-word; }
-.facts td { overflow-wrap: anywhere; }
-.facts td:first-child { color: var(--soft); width: 40%; }
-@media (max-width: 700px) {
-  body { padding: 16px 14px 32px; }
-  .verdict { padding: 12px 14px; }
-  .verdict .headline { font-size: 18px; }
-  .chart { overflow-x: auto; }
-  .chart > svg { width: 700px; }
-  .chart + figcaption::before { content: "Swipe the chart sideways. "; }
-  .facts { grid-template-columns: 1fr; }
-  .wide th, .wide td { padding-right: 8px; }
-  td svg.share { display: none; }
-  .candidates thead { display: none; }
-  .candidates tr { display: block; padding: 6px 0; border-bottom: 1px solid var(--rule); }
-  .candidates td { display: block; border: 0; padding: 2px 8px; }
-  .candidates td.number { display: inline-block; text-align: left; padding-right: 18px; }
-  .candidates td.number::before { color: var(--soft); font-size: 13px; content: "rms "; }
-  .candidates td:nth-child(4)::before { content: "χ²/dof "; }
-  .candidates td:nth-child(5)::before { content: "ΔBIC "; }
-  .candidates .parameter { white-space: normal; }
-  .candidates tr.chosen { background: #eef8f4; border-left: 8px solid #00734f; }
-  .candidates tr.chosen td, .candidates tr.chosen td:first-child { border: 0; }
-}
-@media print {
-  @page { margin: 14mm; }
-  body { max-width: none; padding: 0; font-size: 11pt; }
-  h2, h3 { break-after: avoid; }
-  .verdict, figure, tr, .attention { break-inside: avoid; }
-  .verdict, .verdict.adequate, .verdict.warning, tr.chosen td { background: #fff;
-    border-color: #000; }
-  .wide { overflow: visible; }
-  .tag { color: #000; }
-  .pictures { grid-template-columns: repeat(3, 1fr); }
-  figcaption, .soft, .text { color: #333; }
-}
-"""

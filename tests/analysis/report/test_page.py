@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import errno
+import hashlib
+import json
 import os
 import re
 from dataclasses import replace
@@ -14,7 +17,7 @@ import pytest
 
 from analysis.report.data import Parameter, ReportData
 from analysis.report.page import report_html, write_report
-from analysis.report.style import CSS, format_value
+from analysis.report.style import CSS, HOVER, format_value, visible
 from instrument.errors import StorageError
 from instrument.geometry import FloatArray
 from instrument.record.reading import Preview
@@ -29,12 +32,16 @@ def page() -> str:
 
 
 class TestPage:
-    def test_is_self_contained_and_without_scripts(self, page: str) -> None:
+    def test_is_self_contained_and_has_one_script_of_its_own(self, page: str) -> None:
         assert set(re.findall(r"https?://[^\s\"'<)]+", page)) == {"http://www.w3.org/2000/svg"}
         assert set(re.findall(r'(?:src|href)="(.)', page)) <= {"#", "d"}
-        assert not re.search(r"<script|<link|@import|url\((?!#)|\son\w+=", page)
+        assert not re.search(r"<link|@import|url\((?!#)|\son\w+=", page)
+        data, own = re.findall(r"<script([^>]*)>(.*?)</script>", page, re.DOTALL)
+        assert data[0] == ' type="application/json" id="points"'
+        assert own == ("", HOVER)
+        assert page.count("<script") == 2
 
-    def test_its_policy_forbids_scripts_and_loading_anything(self, page: str) -> None:
+    def test_its_policy_forbids_loading_anything_and_any_other_script(self, page: str) -> None:
         """It comes before all that it governs."""
         policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]+)"', page)
         assert policy is not None
@@ -42,7 +49,8 @@ class TestPage:
         assert rules["default-src"] == "'none'"
         assert rules["style-src"] == "'unsafe-inline'"
         assert rules["img-src"] == "data:"
-        assert "script-src" not in rules
+        digest = hashlib.sha256(HOVER.encode()).digest()
+        assert rules["script-src"] == f"'sha256-{base64.b64encode(digest).decode()}'"
         assert policy.start() < page.index("<title>") < page.index("<style>")
 
     @pytest.mark.parametrize(
@@ -56,8 +64,8 @@ class TestPage:
         assert page.count(f'id="{section}"') == 1
 
     def test_charts_are_well_formed_and_no_id_is_used_twice(self, page: str) -> None:
-        # Three charts, a bar for each of two rows of the budget, one picture.
-        assert len(svgs(page)) == 6
+        # Three charts in two widths, a bar for each of two rows of the budget, one picture.
+        assert len(svgs(page)) == 9
         ids = re.findall(r'\bid="([^"]+)"', page)
         assert len(ids) == len(set(ids))
         assert set(re.findall(r'(?:href="|url\()#([^")]+)', page)) <= set(ids)
@@ -135,10 +143,13 @@ def test_hostile_texts_are_escaped() -> None:
             times=rows,
         )
     )
-    assert "<script" not in page
+    data, own = re.findall(r"<script[^>]*>(.*?)</script>", page, re.DOTALL)
+    assert own == HOVER
+    assert json.loads(data)[0].endswith(visible(HOSTILE))
+    assert page.count("<script") == 2
     assert "\x00" not in page
     assert page.count("&lt;script&gt;alert(&#x27;1&#x27;)") > 25
-    assert len(svgs(page)) == 5
+    assert len(svgs(page)) == 8
 
 
 class TestFile:
@@ -182,7 +193,7 @@ class TestBrokenNumbers:
         column[1:6] = NAN, np.inf, -np.inf, 0.0, -1.0
         changes: dict[str, Any] = {where: column}
         page = report_html(replace(data, **changes))
-        assert len(svgs(page)) == 6
+        assert len(svgs(page)) >= 9
         assert "nan" not in words(page).lower()
 
     def test_no_valid_number(self) -> None:
@@ -199,7 +210,7 @@ class TestBrokenNumbers:
             curve=lambda _i, _d, theta_r: np.full(np.shape(theta_r), np.nan),
         )
         whole = replace(data, candidates=(model,))
-        assert len(svgs(report_html(whole))) == 6
+        assert len(svgs(report_html(whole))) == 9
         page = report_html(replace(whole, **columns))
         assert "No geometry has a value to plot." in page
 

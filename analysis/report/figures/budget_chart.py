@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.report.charts import margins, panels_of, sweep_label, thinned
 from analysis.report.data import ReportData
-from analysis.report.style import GREY, INK, svg_of
+from analysis.report.figures.charts import margins, panels_of, sweep_label, thinned
+from analysis.report.style import GREY, INK, NARROW_IN, WIDTH_IN, Drawing
 from analysis.report.sweeps import PlottedSweep
 from analysis.report.swept_axis import AZIMUTH
 from instrument.geometry import FloatArray
@@ -26,7 +26,6 @@ _MOST = 6  # sources with a band of their own
 # Dark and light in turn, so that neighbours differ on a printer without colours too.
 _BANDS = ("#0072B2", "#F0A860", "#007A5A", "#E9B9DC", "#8A4A00", "#9BD0F0", "#C9C9C9")
 OTHERS = "all others"
-_LEGEND_COLUMNS = 4
 
 
 def stacks(data: ReportData, sweep: PlottedSweep) -> FloatArray:
@@ -63,13 +62,16 @@ def _order(data: ReportData) -> list[int]:
     return [int(n) for n in np.argsort(-means, kind="stable")]
 
 
-def budget_chart(data: ReportData, sweeps: Sequence[PlottedSweep]) -> str:
+def budget_drawing(
+    data: ReportData, sweeps: Sequence[PlottedSweep], *, narrow: bool = False
+) -> Drawing:
     """Stacked bands of each sweep, with a legend in the order of the stack."""
     shown = thinned(sweeps)
-    columns = min(len(shown), 3)
+    columns = 1 if narrow else min(len(shown), 3)
     rows = -(-len(shown) // columns)
     names = ranked_sources(data)
-    lines = -(-len(names) // _LEGEND_COLUMNS)
+    in_a_line = 2 if narrow else 4
+    lines = -(-len(names) // in_a_line)
     top = 0.3 + 0.24 * lines
 
     def draw(figure: Figure) -> None:
@@ -89,9 +91,9 @@ def budget_chart(data: ReportData, sweeps: Sequence[PlottedSweep]) -> str:
         for ax in axes[:, 0]:
             ax.set_ylabel("relative u (%)")
         axes[0, 0].set_ylim(bottom=0.0)
-        _legend(figure, names)
+        _legend(figure, names, in_a_line)
 
-    return svg_of(0.75 + top + 2.2 * rows, draw, "budget")
+    return Drawing(0.75 + top + 2.2 * rows, draw, NARROW_IN if narrow else WIDTH_IN)
 
 
 def _panel(ax: Axes, data: ReportData, sweep: PlottedSweep) -> None:
@@ -107,10 +109,10 @@ def _panel(ax: Axes, data: ReportData, sweep: PlottedSweep) -> None:
         ax.set_xticks(range(-60, 91, 60))
 
 
-def _legend(figure: Figure, names: Sequence[str]) -> None:
+def _legend(figure: Figure, names: Sequence[str], in_a_line: int) -> None:
     from matplotlib.patches import Patch
 
     patches = [Patch(color=colour, label=name) for name, colour in zip(names, _BANDS, strict=False)]
     figure.legend(
-        handles=patches, loc="upper center", ncols=_LEGEND_COLUMNS, frameon=False, handlelength=1.2
+        handles=patches, loc="upper center", ncols=in_a_line, frameon=False, handlelength=1.2
     )

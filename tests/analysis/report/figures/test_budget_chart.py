@@ -8,9 +8,15 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from analysis.report.budget_chart import budget_chart, ranked_sources, stacks, with_budget
 from analysis.report.data import ReportData
+from analysis.report.figures.budget_chart import (
+    budget_drawing,
+    ranked_sources,
+    stacks,
+    with_budget,
+)
 from analysis.report.page import report_html
+from analysis.report.style import svg_file
 from analysis.report.sweeps import group_sweeps
 from tests.support.analysis.report_data import NAN, data_of
 
@@ -31,7 +37,9 @@ def test_the_bands_add_up_to_the_standard_uncertainty(sources: int) -> None:
         bands = stacks(data, sweep)
         assert len(bands) == len(ranked_sources(data)) == min(sources, 7)
         assert bands.sum(axis=0) == pytest.approx(100 * u[sweep.at], rel=1e-9)
-    ElementTree.fromstring(budget_chart(data, group_sweeps(data)))
+    for narrow in (False, True):
+        drawing = budget_drawing(data, group_sweeps(data), narrow=narrow)
+        ElementTree.fromstring(svg_file(drawing))
 
 
 def test_a_sweep_of_flagged_points_has_no_panel() -> None:

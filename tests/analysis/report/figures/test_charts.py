@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.report import charts
+from analysis.report.figures import charts
 from analysis.report.page import report_html
+from analysis.report.style import svg_file
 from analysis.report.sweeps import group_sweeps
 from tests.support.analysis.report_data import data_of, without_tile, words
 
@@ -17,8 +18,10 @@ VIEWS = tuple(np.arange(-70.0, 71.0, 10.0))
 
 
 def _shape(page: str) -> str:
-    """Text of the charts of the shape and of their caption."""
-    return words(page[page.index('id="shape"') : page.index('id="brdf"')])
+    """Text of the charts of the shape for a wide page, and of their caption."""
+    section = page[page.index('id="shape"') : page.index('id="brdf"')]
+    wide, narrow = section.split('<div class="chart narrow">')
+    return words(wide + narrow[narrow.index("<figcaption>") :])
 
 
 def test_many_sweeps_are_thinned_and_the_captions_state_it() -> None:
@@ -77,6 +80,7 @@ def test_every_number_of_a_legend_has_its_line() -> None:
     shown = charts.thinned_series(sweeps)
     assert [s.series for s in shown][:1] == [0]
     assert [s.series for s in shown][-1:] == [13]
-    (svg,) = charts.shape_charts(sweeps, "BRDF (1/sr)")
-    labels = re.findall(r"lamp at θᵢ = ([0-9]+)°", svg)
-    assert labels == [f"{s.series_deg:g}" for s in shown]
+    for narrow in (False, True):
+        (drawing,) = charts.shape_drawings(sweeps, "BRDF (1/sr)", narrow=narrow)
+        labels = re.findall(r"lamp at θᵢ = ([0-9]+)°", svg_file(drawing))
+        assert labels == [f"{s.series_deg:g}" for s in shown]

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
+from analysis.report.figures.value_axis import set_symmetric_axis, set_value_axis
 from analysis.report.sweeps import PlottedSweep, group_sweeps
-from analysis.report.value_axis import set_symmetric_axis, set_value_axis
 from tests.support.analysis.report_data import data_of
 
 MAGNITUDES = st.floats(-12, 12).map(lambda power: 10.0**power)

@@ -1,4 +1,4 @@
-"""`gonio report --pdf`: printed by an installed Chromium, or refused before anything is written."""
+"""`gonio report`: printed to PDF by an installed Chromium, its figures as files, or refused."""
 
 from __future__ import annotations
 
@@ -48,3 +48,22 @@ def test_a_browser_that_fails_is_named(run: Path, tmp_path: Path) -> None:
     assert done.returncode == 3
     assert "broken" in done.stderr
     assert (run / "report.html").is_file()
+
+
+def test_figures_are_written_into_a_new_folder_only(run: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "figures"
+    done = gonio("report", run, "--figures", folder)
+    assert done.returncode == 0, done.stderr
+    written = {file.name for file in folder.iterdir()}
+    assert {"shape.svg", "brdf.svg", "polar.svg", "points.csv", "lines.csv"} <= written
+    assert f"{len(written)} files" in done.stderr
+    before = (run / "report.html").stat().st_mtime_ns
+    (taken := tmp_path / "file").touch()
+    for refused, why in (
+        (folder, "is not empty"), (taken, "is no folder"), (tmp_path / "a" / "b", "make it first"),
+    ):  # fmt: skip
+        done = gonio("report", run, "--figures", refused)
+        assert done.returncode == 2
+        assert why in done.stderr
+        assert str(refused) in done.stderr.replace("\n", "")
+    assert (run / "report.html").stat().st_mtime_ns == before
