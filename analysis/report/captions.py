@@ -18,7 +18,9 @@ _MOST_LISTED = 8  # angles; more are counted
 
 def counts(data: ReportData, sweeps: Sweeps) -> str:
     """Numbers of geometries, angles, and points in the fit."""
-    parts = [f"{len(data.flags)} geometries measured", *(_angles(sweeps) if sweeps else ())]
+    number = len(data.flags)
+    measured = "1 geometry" if number == 1 else f"{number} geometries"
+    parts = [f"{measured} measured", *(_angles(sweeps) if sweeps else ())]
     parts.append(f"{int(data.fitted.sum())} in the fit")
     flagged = int(data.flagged.sum())
     parts.append(f"<b>{flagged} flagged</b>" if flagged else "none flagged")

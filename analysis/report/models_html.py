@@ -16,6 +16,7 @@ from analysis.report.style import (
 )
 
 _COVERAGE = 1.96  # of u: 95 % of a normal distribution
+_WITHIN_U = 4.0  # reduced chi2 beyond which a model that passes does so with a larger u than stated
 _STATES = {
     "adequate": ("adequate", "✔ Adequate: the model explains the data"),
     "none adequate": ("warning", "✘ No model explains the data within their uncertainty"),
@@ -48,6 +49,12 @@ def verdict_html(data: ReportData) -> str:
 def _name(raw: str, joints: str = "+/") -> str:
     """Escape a text with names of models or parameters, which may wrap after the joints."""
     return re.sub(rf"(?<=\w)[{joints}](?=\w)", r"\g<0><wbr>", escaped(raw))
+
+
+def _parameter_html(parameter: Parameter) -> str:
+    name = f'<span class="name">{escaped(parameter.name)}</span>'
+    kind = "parameter" if parameter.u is not None else "parameter open"
+    return f'<span class="{kind}">{name} {_value_of(parameter)}</span>'
 
 
 def _value_of(parameter: Parameter) -> str:
@@ -96,6 +103,9 @@ def _why_not(candidate: Candidate, chosen: Candidate | None) -> str:
         return "does not fit: residuals larger than u, or with a pattern"
     if candidate.chosen or chosen is None:
         return ""
+    chi2 = candidate.reduced_chi2
+    if chi2 is not None and chi2 > _WITHIN_U:
+        return f"fits only with {math.sqrt(chi2):.2g} times the stated u"
     more = _free(candidate) - _free(chosen)
     if more > 0:
         return f"fits, but has {more} parameter{'s' * (more > 1)} more than needed"
@@ -116,10 +126,7 @@ def _candidate(
     note = f'<br><span class="tag">{tag}</span>' if candidate.chosen else ""
     if why := _why_not(candidate, chosen):
         note += f'<br><span class="soft">{escaped(why)}</span>'
-    parameters = "".join(
-        f'<span class="parameter"><span class="name">{escaped(p.name)}</span> {_value_of(p)}</span>'
-        for p in candidate.parameters
-    )
+    parameters = "".join(map(_parameter_html, candidate.parameters))
     rms = candidate.rms_relative
     cells = (
         _name(candidate.name) + note,

@@ -71,7 +71,7 @@ def brdf_drawing(sweeps: Sequence[PlottedSweep], quantity: str, *, narrow: bool 
     columns = min(len(shown), 4 if len(shown) in (4, 7, 8) or len(shown) > 9 else 3)
     columns = 1 if narrow else columns
     rows = -(-len(shown) // columns)
-    left = 0.75 if max(float(np.max(np.abs(s.value))) for s in shown) < 1e3 else 1.05
+    left = 0.9 if max(float(np.max(np.abs(s.value))) for s in shown) < 1e3 else 1.05
 
     def draw(figure: Figure) -> list[Marks]:
         grid = {"hspace": 0.4, "wspace": 0.08, **margins(figure, left, 0.15, 0.36, 0.58)}
@@ -152,7 +152,7 @@ def _shape_drawing(
     def draw(figure: Figure) -> list[Marks]:
         top = legend_in + (0.68 if titled else 0.44)
         grid: dict[str, Any] = {"height_ratios": _HEIGHTS[:rows], "hspace": 0.12, "wspace": 0.06}
-        grid |= margins(figure, 0.8, 0.15, top, 0.58)
+        grid |= margins(figure, 0.9, 0.15, top, 0.58)
         axes = figure.subplots(
             rows, columns, sharex=True, sharey="row", squeeze=False, gridspec_kw=grid
         )

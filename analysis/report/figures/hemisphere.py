@@ -29,6 +29,7 @@ _LOG_RATIO = 40.0
 _RINGS_DEG = (30, 60, 90)
 _LEAST_TILT_DEG = 1.0  # a view nearer to the normal has no azimuth
 _BAR_CELLS = 64
+_LABELS_AT_RAD = np.radians(-82.0)  # azimuth of the rings' labels, beside the usual ones
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +143,8 @@ def _frame(ax: Axes) -> None:
         radius = np.sin(np.radians(ring))
         colour, width = (GREY, 1.0) if ring == 90 else (GRID, 0.7)
         ax.plot(radius * np.cos(around), radius * np.sin(around), color=colour, lw=width, zorder=1)
-        ax.text(0.0, -radius - 0.02, f"{ring}°", ha="center", va="top", size=8, color=GREY)
+        x, y = np.cos(_LABELS_AT_RAD) * radius, np.sin(_LABELS_AT_RAD) * radius
+        ax.text(x, y, f"{ring}°", ha="center", va="center", size=8, color=GREY, zorder=4)
     for azimuth in range(0, 180, 45):
         x, y = np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))
         ax.plot([-x, x], [-y, y], color=GRID, lw=0.7, zorder=0)
@@ -166,7 +168,15 @@ def _colour_bar(ax: Axes, norm: Normalize, quantity: str) -> None:
     from matplotlib.colors import LogNorm
 
     colours = colormaps[_COLOURS](norm(middle))
-    ax.bar(edges[:-1], 1.0, np.diff(edges), align="edge", color=colours, linewidth=0)
+    ax.bar(
+        edges[:-1],
+        1.0,
+        np.diff(edges),
+        align="edge",
+        color=colours,
+        edgecolor=colours,
+        linewidth=0.4,
+    )
     if isinstance(norm, LogNorm):
         ax.set_xscale("log")
     ax.set_xlim(edges[0], edges[-1])
