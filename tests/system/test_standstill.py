@@ -6,12 +6,19 @@ import os
 import subprocess
 import sys
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from tests.support.paths import ROOT
 from tests.support.timing.deadline import wait_for
-from tests.support.timing.standstill import STARVED_S, TRIES, Standstills, waited_s
+from tests.support.timing.standstill import (
+    KEPT_WAITING_S,
+    STARVED_S,
+    TRIES,
+    Standstills,
+    waited_s,
+)
 
 CONFTEST = """
 import pytest
@@ -109,6 +116,31 @@ def test_a_process_of_the_test_that_is_kept_from_running_is_a_standstill() -> No
             stack.callback(child.kill)
         wait_for(lambda: standstills.starved_s > STARVED_S, "a starved process")
     assert standstills.cause
+
+
+def test_a_thread_of_the_test_that_is_kept_from_running_is_a_standstill() -> None:
+    """One that computes waits longer than the thread that measures, which sleeps."""
+    processor, until_s = str(min(os.sched_getaffinity(0))), str(time.monotonic() + 1.5)
+    with ExitStack() as stack:
+        for _ in range(3):
+            command = [sys.executable, "-c", SPIN, processor, "busy", until_s]
+            child = stack.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE))
+            stack.callback(child.kill)
+        with Standstills() as standstills, on_processor(int(processor)):
+            while standstills.kept_waiting_s <= KEPT_WAITING_S:
+                assert time.monotonic() < float(until_s)
+    assert standstills.cause
+
+
+@contextmanager
+def on_processor(number: int) -> Iterator[None]:
+    """Keep this thread on one processor."""
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {number})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
 
 
 def test_a_process_that_sleeps_or_waits_is_none() -> None:

@@ -3,8 +3,9 @@
 Emulated controllers answer within the real ones' times, and drivers have the real time-outs. Where
 the test process gets no processor for longer than that, both miss theirs, and a failure says
 nothing about the program. A thread measures such standstills, one long one or many short ones in a
-row. It sleeps most of the time, and so is served before one that computes: for processes that the
-test started, the kernel's own count tells how long their threads were ready to run and did not.
+row. It sleeps most of the time, and so is served before one that computes: for the other threads of
+the test, and for the processes that it started, the kernel's own count tells how long they were
+ready to run and did not.
 A test in real time that failed in a standstill is repeated, and the summary of the test run says
 so. A failure without one counts.
 """
@@ -28,6 +29,8 @@ TRIES = 4
 STANDSTILL_S = 0.05  # a third of the shortest time-out of a reply
 # Short ones in a row: a fifth of the time for which a moving stage may be silent.
 LATE_S, WITHIN_S = 0.1, 0.5
+# Of WITHIN_S, for a thread of the test: the shortest time-out of a reply.
+KEPT_WAITING_S = 0.15
 # Of WITHIN_S, for a thread of a process of the test: two busy programs leave it half of the time.
 STARVED_S = 0.3
 _TICK_S, _LOOK_S = 0.01, 0.1  # of the own thread; between two looks at other processes
@@ -37,14 +40,15 @@ _PROPERTY = "repeated"
 class Standstills(Closeable):
     """Delays of a thread that wakes every 10 ms, within a `with` block.
 
-    longest_s: the longest. late_s: the largest sum of those within WITHIN_S. starved_s: the longest
-    time within WITHIN_S for which a thread of a child process was kept from running. looks: the
-    last looks at those threads.
+    longest_s: the longest. late_s: the largest sum of those within WITHIN_S. kept_waiting_s,
+    starved_s: the longest time within WITHIN_S for which a thread of the test, or of a child
+    process, was kept from running. looks: the last looks at those threads.
     """
 
     def __init__(self) -> None:
-        self.longest_s = self.late_s = self.starved_s = 0.0
+        self.longest_s = self.late_s = self.kept_waiting_s = self.starved_s = 0.0
         self.looks: deque[dict[int, float]] = deque(maxlen=1 + round(WITHIN_S / _LOOK_S))
+        self._own_looks: deque[dict[int, float]] = deque(maxlen=self.looks.maxlen)
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._measure, daemon=True, name="standstills")
         self._thread.start()
@@ -68,13 +72,13 @@ class Standstills(Closeable):
             self.late_s = max(self.late_s, sum(delay for _, delay in delays_s))
             if now_s - looked_s >= _LOOK_S:
                 looked_s = now_s
-                self._look_at_children()
+                self._look_at_threads()
 
-    def _look_at_children(self) -> None:
+    def _look_at_threads(self) -> None:
         self.looks.append(waited_s(os.getpid()))
-        first, last = self.looks[0], self.looks[-1]
-        more = [waited - first.get(thread, 0.0) for thread, waited in last.items()]
-        self.starved_s = max(self.starved_s, *more, 0.0)
+        self._own_looks.append(threads_waited_s(os.getpid()))
+        self.starved_s = max(self.starved_s, _longest_s(self.looks))
+        self.kept_waiting_s = max(self.kept_waiting_s, _longest_s(self._own_looks))
 
     @property
     def cause(self) -> str:
@@ -83,23 +87,37 @@ class Standstills(Closeable):
             return f"{self.longest_s:.2f} s"
         if self.late_s > LATE_S:
             return f"{self.late_s:.2f} s of {WITHIN_S} s"
+        if self.kept_waiting_s > KEPT_WAITING_S:
+            return f"{self.kept_waiting_s:.2f} s of {WITHIN_S} s, for one of its threads"
         starved = f"{self.starved_s:.2f} s of {WITHIN_S} s, in a process of the test"
         return starved if self.starved_s > STARVED_S else ""
 
 
 def waited_s(process: int) -> dict[int, float]:
-    """Return how long each thread of a process's descendants was ready to run and did not, in s.
+    """Return how long each thread of a process's descendants was ready to run and did not, in s."""
+    found: dict[int, float] = {}
+    for child in _children(process):
+        found |= threads_waited_s(child) | waited_s(child)
+    return found
+
+
+def threads_waited_s(process: int) -> dict[int, float]:
+    """Return how long each thread of a process was ready to run and did not, in s.
 
     Second number of /proc/PID/task/TID/schedstat (Linux, sched-stats.rst), in ns.
     """
     found: dict[int, float] = {}
-    for child in _children(process):
-        for thread in Path(f"/proc/{child}/task").glob("*"):
-            with suppress(OSError):  # it has ended
-                waited = (thread / "schedstat").read_text().split()[1]
-                found[int(thread.name)] = 1e-9 * int(waited)
-        found |= waited_s(child)
+    for thread in Path(f"/proc/{process}/task").glob("*"):
+        with suppress(OSError):  # it has ended
+            waited = (thread / "schedstat").read_text().split()[1]
+            found[int(thread.name)] = 1e-9 * int(waited)
     return found
+
+
+def _longest_s(looks: deque[dict[int, float]]) -> float:
+    """Longest time that a thread has waited between the first and the last look."""
+    first, last = looks[0], looks[-1]
+    return max((waited - first.get(thread, 0.0) for thread, waited in last.items()), default=0.0)
 
 
 def _children(process: int) -> list[int]:
