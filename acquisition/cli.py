@@ -182,6 +182,9 @@ def fit(
             autocompletion=_among(("auto", "qualitative", "functional", "exact")),
         ),
     ] = "auto",
+    out: Annotated[
+        Path | None, typer.Option("--out", help="New folder for report.html and fit.json.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Find the simplest model that explains a run or a table of BRDF.
@@ -204,7 +207,9 @@ def fit(
         cosine_corrected=cosine_corrected,
         mirror_azimuth=mirror_azimuth,
     )
-    fit_source(source, wanted, models=models, robust=robust, method=method, as_json=json)
+    fit_source(
+        source, wanted, models=models, robust=robust, method=method, folder=out, as_json=json
+    )
 
 
 @app.command()

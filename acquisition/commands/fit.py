@@ -1,24 +1,26 @@
-"""Command `gonio fit`: read a source, choose a model, print the outcome."""
+"""Command `gonio fit`: read a source, choose a model, print the outcome, write a report of it."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from acquisition.commands.fit_status import no_fit_reported, print_json, require_result
+from acquisition.commands.outcomes.new_folder import require_new_folder, write_files
 from acquisition.commands.views import parameter_lines
 from acquisition.results.model_check import check_model
 from acquisition.results.sources import Source, Wanted, read_source
 from acquisition.results.summary import VERDICTS, paper_ratio_note, parameters_of
-from acquisition.terminal.console import out, print_lines, print_notes, print_text
+from acquisition.terminal.console import console, out, print_lines, print_notes, print_text
 from acquisition.terminal.layout import table_lines, wrapped
 from acquisition.terminal.progress import sign_of_life
 from analysis.choice.choice import Choice, choose
-from analysis.choice.fit_json import to_json
+from analysis.choice.fit_json import no_fit_json, to_json
 from analysis.choice.ladder import METHODS, MethodOfFit, method_named
 from analysis.fit.fit import FitResult
-from instrument.errors import InputError
+from instrument.errors import InputError, NotDetermined
 from instrument.text.quoting import printable
 from instrument.text.text_file import parse_number
 
@@ -26,36 +28,71 @@ _MOST_ROWS = 12  # of the table of candidates
 
 
 def fit_source(
-    path: Path, wanted: Wanted, *, models: str | None, robust: bool, method: str, as_json: bool
+    path: Path,
+    wanted: Wanted,
+    *,
+    models: str | None,
+    robust: bool,
+    method: str,
+    folder: Path | None = None,
+    as_json: bool,
 ) -> None:
     """Fit the `wanted` part of a source and print the outcome.
 
     `models`: names separated by commas; None for those of a run's protocol, else the ladder.
     `method`: for rough surfaces, one of `analysis.choice.ladder.METHODS`; auto: that of a run's
-    protocol. Raises `InputError` for a wrong source or option; after printing, as
-    `fit_status.require_result` does.
+    protocol. `folder`: a new one for report.html and fit.json, also where no model could be fitted.
+    Raises `InputError` for a wrong source or option; after printing, as `fit_status.require_result`
+    does.
     """
     names, way = _names(models), _method(method, models)
+    if folder is not None:
+        require_new_folder(folder, "--out")
     with no_fit_reported(path, as_json):
         with sign_of_life(f"reading {path.name}"):
             source = read_source(path, wanted)
         if names is None and way == "auto":
             names, way = source.fit.models, source.fit.method
-        with sign_of_life(f"fit of {source.measurements.size} points"):
-            choice = choose(
-                source.measurements,
-                source.acceptance,
-                names,
-                robust,
-                way,
-                certificate_leads=source.fit.certificate_leads,
-            )
+        try:
+            choice = _choice(source, names, robust, way)
+        except NotDetermined as error:
+            if folder is not None:
+                _write(folder, path, source, None, no_fit_json(error))
+            raise
     found = to_json(replace(choice, notes=(*source.notes, *choice.notes)))
     if as_json:
         print_json(found)
     else:
         _print(source, choice)
+    if folder is not None:
+        _write(folder, path, source, choice, found)
     require_result(found, str(path))
+
+
+def _choice(
+    source: Source, names: Sequence[str] | None, robust: bool, method: MethodOfFit
+) -> Choice:
+    with sign_of_life(f"fit of {source.measurements.size} points"):
+        return choose(
+            source.measurements,
+            source.acceptance,
+            names,
+            robust,
+            method,
+            certificate_leads=source.fit.certificate_leads,
+        )
+
+
+def _write(
+    folder: Path, path: Path, source: Source, choice: Choice | None, fit: Mapping[str, object]
+) -> None:
+    """Write the report and fit.json, and say where they are."""
+    from acquisition.commands.outcomes.fit_report import fit_files  # heavy: the charts' library
+
+    remarks = _remarks(source, choice)
+    with sign_of_life("report"):
+        write_files(folder, fit_files(path, source, choice, fit, remarks))
+    console.print(f"report: {folder / 'report.html'}", highlight=False, soft_wrap=True)
 
 
 def _names(models: str | None) -> list[str] | None:
@@ -106,8 +143,16 @@ def _print(source: Source, choice: Choice) -> None:
     print_text(f"{chosen.model}: {VERDICTS[choice.verdict]}.")
     print_lines(["", *parameter_lines(parameters_of(chosen), out.width), ""])
     print_lines([*_table(choice, chosen, out.width), ""])
-    noted = (note.text for note in (*source.notes, *choice.notes))
-    print_notes((choice.reason, str(choice.symmetry), paper_ratio_note(chosen), *noted))
+    print_notes(_remarks(source, choice))
+
+
+def _remarks(source: Source, choice: Choice | None) -> list[str]:
+    """Remarks on the data and the fit, as the terminal and the report have them."""
+    noted = [note.text for note in (*source.notes, *(choice.notes if choice else ()))]
+    if choice is None or choice.best is None:
+        return noted
+    remarks = (choice.reason, str(choice.symmetry), paper_ratio_note(choice.best), *noted)
+    return [remark for remark in remarks if remark]
 
 
 def _table(choice: Choice, chosen: FitResult, width: int) -> list[str]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from acquisition.commands.determinable import Determinable
 from acquisition.commands.fit_status import no_fit_reported, print_json, require_result
-from acquisition.commands.outcomes.figures import require_new_folder, write_figures
+from acquisition.commands.outcomes.new_folder import require_new_folder, write_files
 from acquisition.commands.outcomes.pdf import browser, print_pdf
 from acquisition.commands.scan_session import scan
 from acquisition.commands.views import print_outcome, print_plan
@@ -137,7 +137,7 @@ def report_run(
     """
     printer = browser() if pdf else None
     if figures is not None:
-        require_new_folder(figures)
+        require_new_folder(figures, "--figures")
     with orderly_end(), Record.open(folder) as record:
         _finish(record, load_run_inputs(record), as_json, printer, figures)
 
@@ -203,8 +203,10 @@ def _finish(
     if figures is not None:
         from analysis.report.figure_data import figure_files
 
-        written = write_figures(figures, figure_files(outcome.content))
-        console.print(written, highlight=False, soft_wrap=True)
+        files = figure_files(outcome.content)
+        write_files(figures, files)
+        written = f"{len(files)} files in {figures}" if files else "no value to draw"
+        console.print(f"figures: {written}", highlight=False, soft_wrap=True)
     require_result(outcome.fit, f"{record.folder}: {outcome.state}")
 
 

@@ -10,6 +10,7 @@ from acquisition.results.fitting import Fitted
 from acquisition.results.reduction import Reduced
 from acquisition.results.summary import budget, parameters_of, sources_of
 from acquisition.results.versions import LIBRARIES, versions_of
+from analysis.choice.choice import Choice
 from analysis.fit.fit import FitResult
 from analysis.report.data import Candidate, Curve, ReportData
 from instrument.config.axes import AXES
@@ -67,8 +68,11 @@ def report_data(
 
 def candidates(fitted: Fitted) -> tuple[Candidate, ...]:
     """Return all candidates for the report."""
-    if fitted.choice is None:
-        return ()
+    return () if fitted.choice is None else candidates_of(fitted.choice)
+
+
+def candidates_of(choice: Choice) -> tuple[Candidate, ...]:
+    """Return the candidates of a choice for the report."""
     return tuple(
         Candidate(
             name=result.model,
@@ -77,13 +81,13 @@ def candidates(fitted: Fitted) -> tuple[Candidate, ...]:
             reduced_chi2=result.reduced_chi2,
             bic=result.bic,
             converged=result.converged,
-            chosen=result.model == fitted.choice.chosen,
-            agrees=result.model in fitted.choice.agreeing,
+            chosen=result.model == choice.chosen,
+            agrees=result.model in choice.agreeing,
             message=result.message,
             residuals=result.residuals,
             curve=_curve(result),
         )
-        for result in fitted.choice.candidates
+        for result in choice.candidates
     )
 
 

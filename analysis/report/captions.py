@@ -151,7 +151,7 @@ def hemisphere_caption(data: ReportData, maps: Sequence[HemisphereMap], quantity
 
 
 def _scaled(data: ReportData) -> str:
-    return "" if data.has_brdf else ", each scaled to its points"
+    return "" if data.absolute else ", each scaled to its points"
 
 
 def _marker_caption(data: ReportData) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,14 @@ MAX_LINES = 3
 _COLUMNS = (
     "dphi_deg", "theta_r_deg", "brdf", "u_brdf", "radiance", "u_radiance", "flags", "fitted",
 )  # fmt: skip
+
+
+class Quantity(NamedTuple):
+    """Measured quantity: its name, its unit, and its name as a column of a table."""
+
+    name: str
+    unit: str
+    column: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +73,8 @@ class ReportData:
     """Content of a report. Arrays and `flags` have one entry per point (N,).
 
     theta_i_deg, dphi_deg, theta_r_deg: in degrees, theta_r signed.
-    brdf, u_brdf: in 1/sr; NaN throughout where no white tile was measured.
+    brdf, u_brdf: in 1/sr; NaN throughout where no white tile was measured. With `relative_brdf` in
+        a unit of their own, which nothing fixes.
     radiance, u_radiance: in counts/s.
     flags: empty for a good point. fitted: True for the points in the fit.
     verdict: the headline, then further sentences. verdict_kind: `adequate`, `none adequate`, `not
@@ -91,6 +101,7 @@ class ReportData:
     candidates: tuple[Candidate, ...] = ()
     budget: tuple[tuple[str, float, float], ...] = ()
     sources: Mapping[str, FloatArray] = field(default_factory=dict)
+    relative_brdf: bool = False
     previews: tuple[Preview, ...] = ()
     rig: Rows = ()
     devices: Rows = ()
@@ -114,9 +125,25 @@ class ReportData:
         return bool(np.any(np.isfinite(self.brdf)))
 
     @property
+    def measured(self) -> Quantity:
+        """The measured quantity: BRDF, relative BRDF, or radiance without a white tile."""
+        if not self.has_brdf:
+            return Quantity("Radiance", "counts/s", "radiance_counts_per_s")
+        if self.relative_brdf:
+            return Quantity("Relative BRDF", "", "brdf_relative")
+        return Quantity("BRDF", "1/sr", "brdf_per_sr")
+
+    @property
     def quantity(self) -> str:
-        """Name and unit of the measured quantity."""
-        return "BRDF (1/sr)" if self.has_brdf else "radiance (counts/s)"
+        """Name and unit of the measured quantity, as on an axis."""
+        name, unit, _ = self.measured
+        name = name if name.startswith("BRDF") else name.lower().replace("brdf", "BRDF")
+        return f"{name} ({unit})" if unit else name
+
+    @property
+    def absolute(self) -> bool:
+        """True where the values have a scale; else lines of models are scaled to the points."""
+        return self.has_brdf and not self.relative_brdf
 
     @property
     def value_and_u(self) -> tuple[FloatArray, FloatArray]:

@@ -44,8 +44,8 @@ def figure_files(data: ReportData) -> dict[str, str]:
 
 def _points_csv(data: ReportData, sweeps: Sequence[PlottedSweep]) -> str:
     """Points of all sweeps in the order of the charts."""
-    value, u = _value_names(data)
-    head = (*_ANGLES, value, u, "deviation_percent", "u_deviation_percent", "residual_u",
+    value = data.measured.column
+    head = (*_ANGLES, value, f"u_{value}", "deviation_percent", "u_deviation_percent", "residual_u",
             "fitted", "flags")  # fmt: skip
     rows = (
         (
@@ -74,7 +74,7 @@ def _lines_csv(data: ReportData, sweeps: Sequence[PlottedSweep]) -> str:
             for n, at in enumerate(line):
                 place = (_number(float(angle[n])) for angle in angles)
                 rows.append((candidate.name, *place, _number(at)))
-    return _csv(("model", *_ANGLES, _value_names(data)[0]), rows)
+    return _csv(("model", *_ANGLES, data.measured.column), rows)
 
 
 def _budget_csv(data: ReportData) -> str:
@@ -84,12 +84,6 @@ def _budget_csv(data: ReportData) -> str:
         for i in range(len(data.flags))
     )
     return _csv((*_ANGLES, *(f"u of {name} (%)" for name in data.sources)), rows)
-
-
-def _value_names(data: ReportData) -> tuple[str, str]:
-    if data.has_brdf:
-        return "brdf_per_sr", "u_brdf_per_sr"
-    return "radiance_counts_per_s", "u_radiance_counts_per_s"
 
 
 def _angles(data: ReportData, i: int) -> tuple[str, ...]:

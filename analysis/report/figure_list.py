@@ -45,7 +45,7 @@ def chart_figures(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> list[Re
     """Return the figures of what was measured; none without a value."""
     if not sweeps:
         return []
-    name, quantity = "BRDF" if data.has_brdf else "Radiance", data.quantity
+    name, quantity = data.measured.name, data.quantity
     found = [
         ReportFigure(
             name="shape",

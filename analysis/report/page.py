@@ -88,7 +88,7 @@ def _flagged(data: ReportData) -> str:
     if not at:
         return ""
     value, u = data.value_and_u
-    unit = "1/sr" if data.has_brdf else "counts/s"
+    unit = data.measured.unit
     rows = []
     for i in at:
         angles = (data.theta_i_deg[i], data.dphi_deg[i], data.theta_r_deg[i])

@@ -26,7 +26,7 @@ def point_texts(data: ReportData, sweeps: Sequence[PlottedSweep]) -> list[str]:
     """Return one text (N,) for each point of the run, empty for a point that is in no chart."""
     texts = [""] * len(data.flags)
     value, u = data.value_and_u
-    name, unit = ("BRDF", "1/sr") if data.has_brdf else ("Radiance", "counts/s")
+    name, unit, _ = data.measured
     for sweep in sweeps:
         for n, i in enumerate(sweep.at):
             angles = (("θᵢ", data.theta_i_deg), ("θᵣ", data.theta_r_deg), ("Δφ", data.dphi_deg))

@@ -110,7 +110,7 @@ def _sweep(data: ReportData, places: _Places, panel: int, series: int) -> Plotte
     panel_deg, series_deg = np.median(places.panel_deg[at]), np.median(places.series_deg[at])
     grid = _grid(x)
     lines = _lines(data, places.axis, grid, float(series_deg), float(panel_deg))
-    if not data.has_brdf:
+    if not data.absolute:
         lines = [_scaled(line, grid, x[good], value[good]) for line in lines]
     deviation, u_deviation = _deviation(value, u, lines, np.searchsorted(grid, x))
     measured = (grid >= x[0]) & (grid <= x[-1])
