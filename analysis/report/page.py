@@ -11,9 +11,9 @@ from pathlib import Path
 from analysis.report import captions
 from analysis.report.data import ReportData, Rows
 from analysis.report.figure_list import budget_figure, chart_figures
-from analysis.report.models_html import candidates_html, verdict_html
-from analysis.report.pictures_html import pictures_html
 from analysis.report.point_texts import points_html
+from analysis.report.sections.models_html import candidates_html, verdict_html
+from analysis.report.sections.pictures_html import pictures_html
 from analysis.report.style import (
     CSS,
     HOVER,

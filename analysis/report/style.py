@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from analysis.report.compact_svg import compact_svg
 from instrument.geometry import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -134,7 +135,7 @@ def svg_of(height_in: float, draw: Draw, name: str) -> str:
 def embedded_svg(drawing: Drawing, name: str) -> str:
     """Return a chart as an SVG element for a page: without fixed size, with unique ids."""
     svg, marks = _drawn(drawing, transparent=True)
-    svg = svg[svg.index("<svg") :].replace("xlink:href=", "href=")
+    svg = compact_svg(svg[svg.index("<svg") :].replace("xlink:href=", "href="))
     head, end, body = svg.partition(">")
     head = re.sub(r' (width|height|xmlns:xlink)="[^"]*"', "", head)
     body = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", body)
