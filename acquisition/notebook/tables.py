@@ -106,7 +106,7 @@ def read_table(
     cosine_corrected: bool = False,
     mirror_azimuth: bool = False,
 ) -> Table:
-    """Read a table of BRDF: CSV, or ASTM, Zemax, pab-opto or ALTA text, told by its content.
+    """Read a table of BRDF: CSV, ASTM, Zemax, pab-opto, ALTA or MERL, told by its content.
 
     CSV has the columns theta_i_deg, theta_r_deg, dphi_deg in degrees, brdf in 1/sr and, if known,
     u_brdf in 1/sr. Rows beyond `max_theta_deg` (degrees) are left out. relative: the values have no

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -19,6 +20,13 @@ from analysis.data.curet import TABLE, VALUES, read_curet
 from analysis.data.measurements import Measurements, SharedError
 from analysis.data.repeats import Repeats, mean_of_repeats
 from analysis.exchange.conventions import from_mirror_azimuth, without_cosine
+from analysis.exchange.dense.merl_reader import (
+    LARGEST_DEG,
+    STEP_DEG,
+    THETA_I_DEG,
+    is_merl,
+    read_merl,
+)
 from analysis.exchange.imports import READERS, kind_of, read_foreign
 from instrument.config.protocol import FitConfig, WhiteTile
 from instrument.errors import AllFlagged, InputError, NoMeasurement, NotDetermined
@@ -27,7 +35,7 @@ from instrument.text.quoting import printable
 from instrument.text.text_file import TextFile, read_text
 
 _U_NAME = re.compile(r"(u|unc|uncertainty|err|error|std|sd|sigma|stdev|σ)(\b|_)", re.IGNORECASE)
-FORMATS = ("auto", "run", "csv", "curet", *READERS)
+FORMATS = ("auto", "run", "csv", "curet", "merl", *READERS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,13 +93,13 @@ def read_source(path: Path, wanted: Wanted) -> Source:
             f"--u-shared: {wanted.u_shared:g} for a run, which states its own shared errors; "
             "allowed for tables"
         )
-    if (wanted.cosine_corrected or wanted.mirror_azimuth) and kind in ("run", "curet"):
+    if (wanted.cosine_corrected or wanted.mirror_azimuth) and kind in ("run", "curet", "merl"):
         option = "--cosine-corrected" if wanted.cosine_corrected else "--mirror-azimuth"
         raise InputError(f"{option}: for a {kind}, whose conventions are known; allowed for tables")
     if kind == "curet":
         source = _curet(path, wanted)
     else:
-        source = _run(path) if kind == "run" else _table(path, kind, wanted)
+        source = _read(path, kind, wanted)
         source = _restated(_cut(source, wanted.max_theta_deg), wanted)
     if wanted.relative:
         source = replace(source, measurements=replace(source.measurements, relative=True))
@@ -119,11 +127,13 @@ def _kind(path: Path) -> str:
                 f"{path}: is no table; name the folder of its run, {folder}, or its "
                 f"{folder / 'measurements.csv'}"
             )
-        return "csv"
+        return "merl" if is_merl(path) else "csv"
     if (path / FILE_NAME).exists():
         return "run"
     if all((path / name).is_file() for name in (TABLE, VALUES)):
         return "curet"
+    if _pab_files(path):
+        return "pab"
     raise InputError(
         f"{path}: a folder without {FILE_NAME} is no run; name a run's folder or a CSV file, or "
         "add --format curet --sample N for a folder of the CUReT database"
@@ -148,11 +158,24 @@ def _run(path: Path) -> Source:
     return Source(found, acceptance, notes, protocol.fit, protocol.sample.name, tile)
 
 
+def _read(path: Path, kind: str, wanted: Wanted) -> Source:
+    if kind == "run":
+        return _run(path)
+    return _merl(path, wanted) if kind == "merl" else _table(path, kind, wanted)
+
+
 def _table(path: Path, kind: str, wanted: Wanted) -> Source:
     """Read a table; without a format asked for, its content tells which one it is."""
+    if kind == "pab" and path.is_dir():
+        return _foreign([read_text(file) for file in _pab_files(path)], kind, wanted)
     file = read_text(path, pipe=True)
     found = kind_of(file) or kind if wanted.format == "auto" else kind
-    return _csv(file, wanted) if found == "csv" else _foreign(file, found, wanted)
+    return _csv(file, wanted) if found == "csv" else _foreign([file], found, wanted)
+
+
+def _pab_files(folder: Path) -> list[Path]:
+    """Files of a folder that hold one scan by pab-opto: one for each incidence."""
+    return sorted(folder.glob("*.pab"))
 
 
 def _csv(file: TextFile, wanted: Wanted) -> Source:
@@ -165,9 +188,25 @@ def _csv(file: TextFile, wanted: Wanted) -> Source:
     return _with_assumptions(source, wanted, states_shared=table.states_shared)
 
 
-def _foreign(file: TextFile, kind: str, wanted: Wanted) -> Source:
-    m = read_foreign(file, kind, repeats=wanted.repeats is not None)
+def _foreign(files: Sequence[TextFile], kind: str, wanted: Wanted) -> Source:
+    m = read_foreign(files, kind, repeats=wanted.repeats is not None)
     source = _averaged(Source(m, None, ()), wanted)
+    return _with_assumptions(source, wanted, states_shared=False)
+
+
+def _merl(path: Path, wanted: Wanted) -> Source:
+    found = read_merl(path)
+    m, incidences = found.measurements, ", ".join(f"{a:g}" for a in THETA_I_DEG)
+    text = (
+        f"{m.size} of the directions of a MERL file, interpolated between its cells: theta_i "
+        f"{incidences} degrees, views in steps of {STEP_DEG:g} degrees up to {LARGEST_DEG:g} in "
+        "the plane of incidence and across it, closer together at the mirror direction"
+    )
+    if found.without:
+        text += f"; {found.without} more have no value"
+    if not found.alike:
+        text += "; red, green and blue are taken together as luminance (ITU-R BT.709)"
+    source = Source(m, None, (Note(NoteCode.DIRECTIONS, text),))
     return _with_assumptions(source, wanted, states_shared=False)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -39,20 +39,33 @@ def kind_of(file: TextFile) -> str | None:
     return next((name for name, reader in READERS.items() if reader.recognises(file)), None)
 
 
-def read_foreign(file: TextFile, kind: str, *, repeats: bool = False) -> Measurements:
-    """Read a text in the format `kind`; theta_r is signed, with dphi from 0 to 180 degrees.
+def read_foreign(files: Sequence[TextFile], kind: str, *, repeats: bool = False) -> Measurements:
+    """Read texts in the format `kind` as one table.
 
-    Without `repeats`, each direction may stand in it once. Raises `InputError` for every mistake.
+    theta_r is signed, with dphi from 0 to 180 degrees. Without `repeats`, each direction may stand
+    in it once. Raises `InputError` for every mistake.
     """
-    table = READERS[kind].read(file)
-    angles = table.geometry
-    azimuth = np.mod(np.round(angles.dphi_deg, 9), 360.0)
-    far = azimuth >= 180
-    theta_r, dphi = np.where(far, -1, 1) * angles.theta_r_deg, azimuth - np.where(far, 180.0, 0.0)
+    tables = [READERS[kind].read(file) for file in files]
+    angles = [
+        np.concatenate([getattr(table.geometry, name) for table in tables])
+        for name in ("theta_i_deg", "theta_r_deg", "dphi_deg")
+    ]
+    theta_i, theta_r, dphi = _signed(*angles)
+    file = files[0]
     if not repeats:
-        _refuse_repeats(file, np.stack([angles.theta_i_deg, theta_r, dphi], axis=1))
-    u_brdf = _u_brdf(file, table)
-    return Measurements.bare(angles.theta_i_deg, theta_r, dphi, table.brdf, u_brdf)
+        _refuse_repeats(file, np.stack([theta_i, theta_r, dphi], axis=1))
+    u_brdf = _u_brdf(file, np.concatenate([table.u_brdf for table in tables]))
+    brdf = np.concatenate([table.brdf for table in tables])
+    return Measurements.bare(theta_i, theta_r, dphi, brdf, u_brdf)
+
+
+def _signed(
+    theta_i: FloatArray, theta_r: FloatArray, dphi: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Angles (N,) in degrees with dphi from 0 to 180 and the sign on theta_r."""
+    azimuth = np.mod(np.round(dphi, 9), 360.0)
+    far = azimuth >= 180
+    return theta_i, np.where(far, -1, 1) * theta_r, azimuth - np.where(far, 180.0, 0.0)
 
 
 def _refuse_repeats(file: TextFile, angles: FloatArray) -> None:
@@ -67,14 +80,14 @@ def _refuse_repeats(file: TextFile, angles: FloatArray) -> None:
         )
 
 
-def _u_brdf(file: TextFile, table: BrdfTable) -> FloatArray | None:
+def _u_brdf(file: TextFile, u_brdf: FloatArray) -> FloatArray | None:
     """Standard uncertainties (N,) in 1/sr, None where none is known."""
-    known = np.isfinite(table.u_brdf)
+    known = np.isfinite(u_brdf)
     if not np.any(known):
         return None
     if not np.all(known):
         raise InputError(
-            f"{file.name}: u is 0 or missing for {int(np.sum(~known))} of {table.size} values; "
+            f"{file.name}: u is 0 or missing for {int(np.sum(~known))} of {known.size} values; "
             "allowed: a u for all values or for none"
         )
-    return table.u_brdf
+    return u_brdf

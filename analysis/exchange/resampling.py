@@ -56,7 +56,7 @@ def side_file(
 ) -> tuple[str, bytes]:
     """Name and content of the side file, JSON: the origin of values that were not measured.
 
-    note: the file's statement in words. more: further entries.
+    stem: its name without .json. note: the file's statement in words. more: further entries.
     """
     table, units = export.table, _units(model)
     parameters = {

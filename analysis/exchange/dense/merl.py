@@ -66,7 +66,7 @@ def files(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
         np.array(SHAPE, dtype="<i4").tobytes() + b"".join(p.tobytes() for p in planes),
     )
     all_cells = {"all": int(np.prod(SHAPE)), **counts}
-    yield side_file(export, model, stem, _NOTE, {"cells": all_cells})
+    yield side_file(export, model, f"{stem}.{NAME}", _NOTE, {"cells": all_cells})
 
 
 def _values(model: ExportedModel, geometry: Geometry) -> FloatArray:

@@ -61,7 +61,7 @@ def files(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
     yield f"{stem}_rgb.bsdf", _tensors(_fields(table, {"rgb": _repeated(table, 3)}))
     spectral = {"wavelengths": np.array(_VISIBLE_NM, "f4"), "spectra": _repeated(table, 2)}
     yield f"{stem}_spectral.bsdf", _tensors(_fields(table, spectral))
-    yield side_file(export, model, stem, _NOTE, table.facts)
+    yield side_file(export, model, f"{stem}.{NAME}", _NOTE, table.facts)
 
 
 def _material(plug_in: str, content: str, comment: str) -> bytes:

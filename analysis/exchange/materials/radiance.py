@@ -77,7 +77,7 @@ def files(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
     yield f"{stem}.rad", _material([*lines, found], stem, "plasdata", texts, numbers)
     yield f"{stem}.dat", _data(table)
     yield f"{stem}.cal", _FUNCTIONS.encode()
-    yield side_file(export, model, stem, _NOTE, table.facts)
+    yield side_file(export, model, f"{stem}.{NAME}", _NOTE, table.facts)
 
 
 def _material(comment: list[str], name: str, kind: str, texts: str, numbers: str) -> bytes:

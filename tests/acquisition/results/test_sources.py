@@ -15,6 +15,7 @@ from acquisition.results.run_folder import load_run_inputs, run_meta, write_run_
 from acquisition.results.sources import Wanted, read_source
 from acquisition.rig import open_devices
 from analysis.choice.notes import NoteCode
+from analysis.exchange.dense import merl
 from instrument.config.load import Loaded, load_protocol
 from instrument.errors import AllFlagged, InputError
 from instrument.record.record import Record
@@ -130,4 +131,32 @@ def test_a_folder_of_the_curet_database_is_recognised(tmp_path: Path) -> None:
     (tmp_path / "abrdf.dat").write_text(curet_texts.VALUES)
     assert read_source(tmp_path, Wanted(sample=1)).measurements.size == 3
     with pytest.raises(InputError, match=r"--sample: missing for the format curet"):
+        read_source(tmp_path, Wanted())
+
+
+def test_a_merl_file_is_recognised_and_what_is_taken_from_it_named(tmp_path: Path) -> None:
+    path = tmp_path / "matte.binary"
+    cells = np.full((3, 90, 90, 180), 0.1) / np.reshape(merl.SCALES, (3, 1, 1, 1))
+    path.write_bytes(np.array(merl.SHAPE, dtype="<i4").tobytes() + cells.astype("<f8").tobytes())
+    source = read_source(path, Wanted(max_theta_deg=70.0))
+    np.testing.assert_allclose(source.measurements.brdf, 0.1, rtol=1e-12)
+    assert np.max(np.abs(source.measurements.theta_r_deg)) == 70.0
+    said = [note.text for note in source.notes if note.code == NoteCode.DIRECTIONS]
+    assert "directions of a MERL file, interpolated between its cells" in said[0]
+    with pytest.raises(InputError, match="for a merl, whose conventions are known"):
+        read_source(path, Wanted(mirror_azimuth=True))
+
+
+def test_a_folder_of_pab_files_is_one_table(tmp_path: Path) -> None:
+    """One file for each incidence, as `gonio export` and the instrument write them."""
+    for n, theta_i in enumerate((30, 50)):
+        rows = "\n".join(f"{theta_r} 180 0.{n + 1}" for theta_r in range(0, 80, 10))
+        head = f"#format: theta phi BSDF\n#intheta {theta_i}\n#inphi 0\n#upphi 0\n"
+        (tmp_path / f"scan_{n}.pab").write_text(f"{head}{rows}\n")
+    (tmp_path / "scan.u.csv").write_text("theta_i_deg,u_brdf\n30,0.1\n")
+    m = read_source(tmp_path, Wanted()).measurements
+    assert sorted(set(m.theta_i_deg.tolist())) == [30.0, 50.0]
+    np.testing.assert_allclose(m.brdf, np.where(m.theta_i_deg == 30, 0.1, 0.2))
+    (tmp_path / "again.pab").write_text((tmp_path / "scan_0.pab").read_text())
+    with pytest.raises(InputError, match="8 directions stand in it more than once"):
         read_source(tmp_path, Wanted())

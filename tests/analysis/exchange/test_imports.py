@@ -42,7 +42,7 @@ def test_an_export_is_recognised_and_read_with_signed_angles(kind: str) -> None:
     exported = export()
     file = text_file(written(kind, exported))
     assert kind_of(file) == kind
-    m = read_foreign(file, kind)
+    m = read_foreign([file], kind)
     assert np.unique(m.lamp_setting).size == 1
     columns = (np.full(THETA_R.size, 30.0), THETA_R, 0 * THETA_R, exported.table.brdf)
     np.testing.assert_allclose(by_angle(m), np.transpose(columns), rtol=1e-12, atol=2e-6)
@@ -59,14 +59,14 @@ def test_repeats_are_refused_unless_they_are_averaged() -> None:
     lines = written("astm", export()).replace("NUM_POINTS 31", "NUM_POINTS 32").split("\n")
     text = "\n".join([*lines[:-1], lines[-2], ""])
     with pytest.raises(InputError, match=r"mine: 1 directions stand in it more than once.*--rep"):
-        read_foreign(text_file(text), "astm")
-    assert read_foreign(text_file(text), "astm", repeats=True).size == 32
+        read_foreign([text_file(text)], "astm")
+    assert read_foreign([text_file(text)], "astm", repeats=True).size == 32
 
 
 def test_a_partly_known_u_is_refused() -> None:
     text = written("alta", export()).replace(" 0.01\n", " 0\n", 1)
     with pytest.raises(InputError, match=r"u is 0 or missing for 1 of 31 values"):
-        read_foreign(text_file(text), "alta")
+        read_foreign([text_file(text)], "alta")
 
 
 @pytest.mark.parametrize("kind", READERS)
@@ -78,7 +78,7 @@ def test_a_damaged_file_is_read_or_refused(kind: str) -> None:
         piece = str(rng.choice(["", "x", "-9e99", "nan", " ", "\n", "#", ",", whole[at : at + 90]]))
         file = text_file(whole[:at] + piece + whole[at + length :])
         try:
-            read_foreign(file, kind, repeats=True)
+            read_foreign([file], kind, repeats=True)
         except InputError as error:
             refused += str(error).startswith("mine:")
     assert refused > 10

@@ -79,11 +79,11 @@ def test_a_wrong_format_or_name_writes_nothing(
 
 
 def test_no_file_is_replaced_by_an_export_or_its_side_file(run: Path, tmp_path: Path) -> None:
-    kept = tmp_path / "mine.json"
+    kept = tmp_path / "mine.merl.json"
     kept.write_text("mine")
     done = gonio("export", run, "--format", "merl", "-o", tmp_path / "mine.binary")
     assert done.returncode == 2
-    assert "mine.json: exists already" in " ".join(done.stderr.split())
+    assert "mine.merl.json: exists already" in " ".join(done.stderr.split())
     assert kept.read_text() == "mine"
     assert list(tmp_path.iterdir()) == [kept]
 

@@ -25,7 +25,7 @@ SWEEPS = random_export(KINDS.index("whole sweeps"))
 def _written(name: str) -> tuple[MerlFile, dict[str, object]]:
     export = explained_by(fitted(name), SWEEPS)
     (main, content), (side, text) = merl.files(export, "mine")
-    assert (main, side) == ("mine.binary", "mine.json")
+    assert (main, side) == ("mine.binary", "mine.merl.json")
     return MerlFile(content), json.loads(text)
 
 

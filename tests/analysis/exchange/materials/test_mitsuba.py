@@ -111,7 +111,7 @@ def test_texts_of_strangers_break_no_material(seed: int) -> None:
 
 def test_the_side_file_says_that_the_table_is_modelled(tmp_path: Path) -> None:
     _written(explained_by(fitted("oren_nayar"), random_export(5)), tmp_path)
-    side = json.loads((tmp_path / "mine.json").read_text())
+    side = json.loads((tmp_path / "mine.mitsuba.json").read_text())
     assert side["origin"] == "modelled"
     assert side["relative_deviation_of_the_table"]["of_95_percent"] < 0.01
     assert side["nodes"]["model_not_valid"] > 0
