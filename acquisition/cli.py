@@ -16,9 +16,10 @@ from typing import Annotated
 import typer
 
 from acquisition.calibrate_cli import calibrate
-from acquisition.cli_parts import Commands, Json, RigOnly, RunFolder
+from acquisition.cli_parts import Commands, Json, ProtocolFile, RigFile, RigOnly, RunFolder
 from acquisition.new_cli import new
 from acquisition.outcomes_cli import compare, export, runs
+from acquisition.plan_cli import plan
 from acquisition.terminal import stop_signals
 from acquisition.terminal.streams import lasting_streams
 from instrument.errors import InputError, StorageError
@@ -52,10 +53,6 @@ def _model_names(incomplete: str) -> list[str]:
     return completed_names(incomplete)
 
 
-ProtocolFile = Annotated[Path, typer.Argument(help="The protocol, a YAML file.")]
-RigFile = Annotated[
-    Path | None, typer.Option("--rig", help="A rig file in place of the one the protocol names.")
-]
 OutFolder = Annotated[
     Path | None,
     typer.Option(
@@ -110,12 +107,7 @@ def run(
     run_protocol(protocol, rig, out, live=live, as_json=json)
 
 
-@app.command()
-def plan(protocol: ProtocolFile, rig: RigFile = None, json: Json = False) -> None:
-    """Show the geometries and the duration of a scan; opens no device."""
-    from acquisition.commands.scan import show_plan
-
-    show_plan(protocol, rig, as_json=json)
+app.command()(plan)
 
 
 @app.command()

@@ -23,6 +23,12 @@ Json = Annotated[
     bool, typer.Option("--json", help="Print only the result, as JSON, on standard output.")
 ]
 
+ProtocolFile = Annotated[Path, typer.Argument(help="The protocol, a YAML file.")]
+
+RigFile = Annotated[
+    Path | None, typer.Option("--rig", help="A rig file in place of the one the protocol names.")
+]
+
 RunFolder = Annotated[Path, typer.Argument(help="The folder of a run.")]
 
 RigOnly = Annotated[Path | None, typer.Option("--rig", help="The rig file.")]

@@ -23,7 +23,6 @@ from instrument.geometry import Brdf, FloatArray, Geometry, IntArray
 
 # Prior u of a parameter in units of its domain: says next to nothing, and every matrix is regular.
 _PRIOR_U = 10.0
-_MANY = 1e8  # repetitions of every point
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,10 +89,6 @@ class Information:
         """
         own = np.diag(self.covariance(counts))[: len(self.names)]
         return dict(zip(self.names, (np.sqrt(own) * self.domain).tolist(), strict=True))
-
-    def least_u(self) -> dict[str, float]:
-        """Standard uncertainty of each parameter that no number of repetitions passes."""
-        return self.u(np.full(len(self.rows), _MANY))
 
     def weights(self, asked: Iterable[str]) -> FloatArray:
         """Weights (unknowns,) on the variances of the asked parameters, for one sum of all.

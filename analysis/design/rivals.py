@@ -15,9 +15,11 @@ import numpy as np
 from analysis.choice.ladder import physics
 from analysis.data.measurements import Measurements
 from analysis.design.information import Information
+from analysis.design.space_filling import farthest
 from analysis.fit.first_fit import FirstFits, enough_points
 from analysis.fit.search.problem import Problem
 from analysis.models import MODELS
+from analysis.models.special_cases import special_cases
 from instrument.geometry import BoolArray, FloatArray, IntArray
 
 TOLD_APART = 100.0
@@ -27,6 +29,8 @@ MOST = 3
 """Rivals that a design regards."""
 
 _TRIED = 6  # candidates with the largest differences to which a rival is fitted
+
+_FITTED = 60  # candidates to which every model is fitted first
 
 _SAME = 1.0  # chi2 at all candidates together, below which no design tells a rival apart
 
@@ -73,13 +77,15 @@ def leading(problem: Problem, m: Measurements, names: Iterable[str]) -> tuple[Ri
     """Rivals among the named models, those first that come closest to the assumed one.
 
     problem: the assumed model's, at all candidates; m: the same as measurements. Models that have
-    its values everywhere, such as those of which it is a special case, are left out, as are those
-    of the same physics by another method, and those with too many parameters.
+    its values everywhere are left out: those of which it is a special case, or of the same physics
+    by another method; and those with too many parameters for the candidates.
     """
-    fits, found = FirstFits(replace(m, brdf=problem.brdf)), []
+    few = replace(m, brdf=problem.brdf).subset(farthest(m.geometry, min(m.size, _FITTED)))
+    fits, found = FirstFits(few), []
     own = physics(problem.model.name)
-    for model in (MODELS[name] for name in names if physics(name) != own):
-        if enough_points(model, m):
+    for model in (MODELS[name] for name in names):
+        cases = (model.name, *(case.name for case in special_cases(model)))
+        if own not in map(physics, cases) and enough_points(model, few):
             first = fits.of(model)
             assumed = replace(problem, model=first.problem.model)
             found.append(Rival.fitted(assumed, first.solution.x))

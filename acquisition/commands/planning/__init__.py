@@ -1,0 +1,1 @@
+"""Command `gonio plan --optimal`: open `optimal.py` first."""

@@ -1,0 +1,109 @@
+"""u of the parameters that a plan will give, by the way that the values of a run take.
+
+Predicted readings are reduced as those of a run are, so that every error of the budget is there,
+shared as it is. The rig's finite lamp, lens and patch are left out: they change all designs alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from acquisition.design.assumed_sample import AssumedSample
+from acquisition.design.predicted_readings import PredictedReadings
+from acquisition.plan.plan import Plan
+from acquisition.results.fitting import measurements
+from acquisition.results.reduction import reduced_rows
+from analysis.data.measurements import Measurements
+from analysis.design.information import Information, assumed_problem
+from analysis.fit.relative_scale import unscaled_parameters
+from analysis.fit.search.problem import Problem
+from instrument.config.load import Loaded
+from instrument.errors import InputError
+from instrument.geometry import BoolArray, FloatArray, Geometry
+from instrument.record.reading import Rows
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Forecast:
+    """Planned points (N,) as a fit will take them, for an assumed sample.
+
+    used: mask over the plan's points of those that the fit will use. problem: the assumed model's,
+    at x (K,), its parameters.
+    """
+
+    used: BoolArray
+    measurements: Measurements
+    problem: Problem
+    x: FloatArray
+
+    @property
+    def information(self) -> Information:
+        """Information of the points about the parameters."""
+        return Information.of(self.problem, self.x)
+
+    def u(self) -> dict[str, float]:
+        """Standard uncertainty of each parameter, in its unit, by all points measured once."""
+        return self.information.u(np.ones(self.measurements.size))
+
+
+def forecast(loaded: Loaded, plan: Plan, sample: AssumedSample) -> Forecast:
+    """Forecast a plan for a sample. Raises `InputError` if none of its points can be used."""
+    loaded = _without_patch(loaded)
+    values = dict(zip((p.name for p in sample.model.parameters), sample.x.tolist(), strict=True))
+
+    def brdf(geometry: Geometry) -> FloatArray:
+        return sample.model.brdf(geometry, **values)
+
+    readings = PredictedReadings(loaded, brdf).of(plan)
+    reduced = reduced_rows(Rows(readings, (), ()), loaded)
+    if not np.any(reduced.valid):
+        flags = ", ".join(sorted({flag for flag in reduced.flags if flag}))
+        raise InputError(
+            f"{loaded.protocol_path}: none of its geometries can be used for a sample like "
+            f"{sample.text}: {flags}"
+        )
+    m = measurements(reduced, loaded)
+    problem, x = assumed_problem(sample.model, sample.x, m)
+    return Forecast(used=reduced.valid, measurements=m, problem=problem, x=x)
+
+
+def _without_patch(loaded: Loaded) -> Loaded:
+    """Return a rig without a dark patch: what it will show of stray light is not known before."""
+    if loaded.rig.camera.dark_patch is None:
+        return loaded
+    camera = loaded.rig.camera.model_copy(update={"dark_patch": None})
+    return replace(loaded, rig=loaded.rig.model_copy(update={"camera": camera}))
+
+
+def asked_parameters(text: str | None, sample: AssumedSample, loaded: Loaded) -> list[str]:
+    """Return the parameters named in a text, separated by commas; without one, all that can be.
+
+    Raises `InputError` for one that the model does not have, or that a scan without a white tile
+    does not determine.
+    """
+    names = [p.name for p in sample.model.parameters]
+    absolute = loaded.protocol.references.white_tile is not None
+    lost = frozenset[str]() if absolute else unscaled_parameters(sample.model)
+    allowed = [name for name in names if name not in lost]
+    if not allowed:
+        raise InputError(
+            f"{loaded.protocol_path}: without a white tile the scan determines no parameter of "
+            f"{sample.model.name}; allowed: a protocol with references: white_tile"
+        )
+    if text is None:
+        return allowed
+    asked = list(dict.fromkeys(filter(None, (part.strip() for part in text.split(",")))))
+    for name in asked:
+        if name in lost:
+            raise InputError(
+                f"--for {name}: not determined without a white tile; allowed: {', '.join(allowed)}"
+            )
+    wrong = [name for name in asked if name not in names]
+    if wrong or not asked:
+        what = ", ".join(wrong) or "nothing"
+        raise InputError(
+            f"--for: {sample.model.name} has no parameter {what}; allowed: {', '.join(allowed)}"
+        )
+    return asked
