@@ -1,7 +1,8 @@
 """Readings that a plan will give for a sample of known reflectance, without noise, with their u.
 
-A uniform sample is assumed: photon and read noise, rounding, darks and the lamp's irradiance of a
-sample that stands off the axis are predicted; the texture of the real one is not known before.
+Photon and read noise, rounding and darks follow from the rig, and so does the lamp's irradiance of
+a sample that stands off the axis. How strong and how fine the sample's texture is, the protocol's
+`simulated_sample` says; without one it is taken as usual.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from instrument.record.reading import Reading
 
 DARK = "no signal predicted"
 _LEAST_FACTOR = 1e-6  # of white, below which a sample is dark
+_MOTTLING, _MOTTLING_MM = 0.02, 2.0  # usual texture (assumed), as in the protocols of configs/
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ class PredictedReadings:
             u_quantisation_dn=rounding_u_dn(bright),
             u_dark_dn=float(np.sqrt(squares * (dark + 1 / 12) / protocol.dark_frames)),
             u_placement_dn=signal_dn * self._u_placement(step),
-            u_texture_dn=0.0,
+            u_texture_dn=signal_dn * self._u_texture(step),
             exposure_s=exposure_s,
             frames=step.frames,
             window_pixels=window.pixels,
@@ -116,3 +118,24 @@ class PredictedReadings:
         theta_i, theta_r, dphi = np.radians([pose.theta_i, pose.theta_r, pose.dphi])
         along_mm = rig.u_placement_mm * float(np.tan(theta_r) * np.cos(dphi))
         return whole + 3 * float(np.sin(theta_i)) * along_mm / rig.lamp_distance_mm
+
+    def _u_texture(self, step: Step) -> float:
+        """Relative second-order effect of a shift of the window over the sample's texture.
+
+        A sample off the axis by u shifts the window by s = u tan(theta_r). The mean over a width W
+        then gains one strip at each edge and loses another, which differ by the texture's change
+        over s. Of texture of relative strength m in spots of size p, strips of the height H differ
+        by about m sqrt(p / H) min(s / p, 1); two edges, and sqrt(3) / 2 as of any second order
+        (`acquisition.measure.placement`).
+        """
+        if step.surface != "sample":
+            return 0.0
+        given, patch = self.loaded.protocol.simulated_sample, self.loaded.protocol.window
+        strength, size_mm = _MOTTLING, _MOTTLING_MM
+        if given is not None:
+            strength, size_mm = given.mottling, given.mottling_size_mm
+        shift_mm = abs(
+            self.loaded.rig.u_placement_mm * float(np.tan(np.radians(step.pose.theta_r)))
+        )
+        strip = strength * np.sqrt(min(size_mm / patch.height_mm, 1.0)) * min(shift_mm / size_mm, 1)
+        return float(np.sqrt(6) / 2 * shift_mm / patch.width_mm * strip)

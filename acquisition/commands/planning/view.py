@@ -85,8 +85,8 @@ def _notes(found: OptimalPlan) -> Iterator[str]:
             f"{found.rivals[name]:.3g} only: plan more geometries, or other incidences"
         )
     yield (
-        "forecast for a sample like the named one, with an even surface: texture at the window's "
-        "edge adds to u"
+        "forecast for a sample like the named one, with the texture of the protocol's "
+        "simulated_sample, or a usual one: the u of a run may be a third larger"
     )
 
 

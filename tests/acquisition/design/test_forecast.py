@@ -43,6 +43,17 @@ def test_u_is_that_which_the_fit_of_a_scan_of_an_even_sample_states(
     assert stated == pytest.approx(list(_u(even).values()), rel=0.1)
 
 
+def test_the_texture_of_the_sample_adds_to_u(small: Loaded) -> None:
+    given = small.protocol.simulated_sample
+    assert given is not None
+    u = [
+        _u(changed(small, simulated_sample=given.model_copy(update={"mottling": mottling})))
+        for mottling in (0.0, 0.02, 0.1)
+    ]
+    assert u[0]["sigma_deg"] < u[1]["sigma_deg"] < u[2]["sigma_deg"]
+    assert _u(changed(small, simulated_sample=None)) == pytest.approx(u[1])  # the usual texture
+
+
 def test_a_better_tile_lowers_the_u_of_the_albedo(small: Loaded) -> None:
     references = small.protocol.references
     assert references.white_tile is not None

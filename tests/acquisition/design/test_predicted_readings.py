@@ -52,6 +52,19 @@ def test_the_effect_of_a_sample_off_the_axis_has_its_size_and_sign(
         assert reading.u_placement_dn / reading.signal_dn == pytest.approx(own, rel=0.4)
 
 
+def test_the_effect_of_texture_is_about_that_of_the_simulated_one(
+    small: Loaded, whole: list[Reading]
+) -> None:
+    """It is random: over all steep views together it has its size within a factor."""
+    steep = [r for r in _predicted(small) if r.kind == "point" and abs(r.theta_r_deg) == 70]
+    predicted = [r.u_texture_dn / r.signal_dn for r in steep]
+    steps = {r.step for r in steep}
+    made = [r.u_texture_dn / r.signal_dn for r in whole if r.step in steps]
+    ratio = float(np.linalg.norm(predicted) / np.linalg.norm(made))
+    assert 1 / 4 < ratio < 4
+    assert not [r for r in _predicted(small) if r.kind == "tile" and r.u_texture_dn]
+
+
 def test_a_sample_without_light_is_flagged(small: Loaded) -> None:
     black = {"model": "lambert", "parameters": {"albedo": 0.0}}
     sample = small.protocol.simulated_sample
