@@ -15,22 +15,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.data.covariance import Covariance
-from instrument.geometry import FloatArray
+from instrument.geometry import BoolArray, FloatArray, IntArray
 
 DISAGREE = 0.01
 """Probability below which runs that agree would seldom differ as much."""
+
+_LEAST = 1e-9  # singular value of columns, relative to the largest, above which it is no rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Values:
     """One run at the G geometries: brdf (G,) in 1/sr, its covariance, and its model there.
 
-    model: (G,) in 1/sr, of the run's best model, for relative errors and ratios.
+    model: (G,) in 1/sr, of the run's best model, for relative errors and ratios. settings: (G,),
+    where the values are relative to a level of each lamp setting, the number of that setting; None:
+    the run has one level.
     """
 
     brdf: FloatArray
     covariance: Covariance
     model: FloatArray
+    settings: IntArray | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,9 +62,11 @@ class Test:
 class Agreement:
     """Outcome for K runs at G geometries.
 
-    whole: of the values as they are. shape: with a factor for each run but the first left free.
-    factors, u_factors: (K,), level of each run relative to the first, and its standard uncertainty
-    with all shared errors, 0 for the first. difference: (K, G) in 1/sr, to the first run.
+    whole: of the values as they are. shape: with a factor for each run but the first left free, and
+    for each lamp setting of `Values.settings`. factors, u_factors: (K,), level of each run relative
+    to the first, and its standard uncertainty with all shared errors, 0 for the first; NaN where
+    runs have a level of each lamp setting. excess: (M,), how far each of the M free levels is above
+    1, in the order of the runs and of `level_points`. difference: (K, G) in 1/sr, to the first run.
     u_difference: (K, G) in 1/sr, its standard uncertainty, in which errors that both share cancel.
     scatter: (G,), standard deviation of the runs relative to their mean. u_scatter: (G,), that
     which the independent parts of u explain.
@@ -67,6 +74,7 @@ class Agreement:
 
     whole: Test
     shape: Test
+    excess: FloatArray
     factors: FloatArray
     u_factors: FloatArray
     difference: FloatArray
@@ -85,18 +93,20 @@ def agreement(runs: Sequence[Values], same: Collection[str] = ()) -> Agreement:
     common = joint_columns([r.covariance for r in runs], same)
     joint = Covariance(variance.ravel(), _centred(common, 1 / variance))
     d = joint.whiten(_centred(y.reshape(-1, 1), 1 / variance)[:, 0])
-    levels = joint.whiten(_centred(_level_columns([r.model for r in runs]), 1 / variance))
-    inverse = np.linalg.pinv(levels.T @ levels)
-    excess = inverse @ (levels.T @ d)
+    levels = joint.whiten(_centred(_level_columns(runs), 1 / variance))
+    inverse = np.linalg.pinv(levels, rcond=_LEAST)
+    excess = inverse @ d
     rest = d - levels @ excess
-    u_excess = np.sqrt(np.diag(inverse))
     runs_n, geometries = y.shape
+    dof = (runs_n - 1) * geometries
+    factors, u_factors = _factors(runs, excess, np.linalg.norm(inverse, axis=1))
     mean = y.mean(axis=0)
     return Agreement(
-        whole=Test(chi2=float(d @ d), dof=(runs_n - 1) * geometries),
-        shape=Test(chi2=float(rest @ rest), dof=(runs_n - 1) * (geometries - 1)),
-        factors=np.concatenate([[1.0], 1 + excess]),
-        u_factors=np.concatenate([[0.0], u_excess]),
+        whole=Test(chi2=float(d @ d), dof=dof),
+        shape=Test(chi2=float(rest @ rest), dof=dof - _rank(levels)),
+        excess=excess,
+        factors=factors,
+        u_factors=u_factors,
         difference=y - y[0],
         u_difference=_u_difference(variance, common.reshape(runs_n, geometries, -1)),
         scatter=np.std(y, axis=0, ddof=1) / np.abs(mean),
@@ -131,12 +141,42 @@ def _centred(columns: FloatArray, weight: FloatArray) -> FloatArray:
     return np.asarray(centred.reshape(columns.shape))
 
 
-def _level_columns(models: Sequence[FloatArray]) -> FloatArray:
-    """Change (K G, K - 1) of all values by the factor of each run but the first."""
-    columns = np.zeros((len(models), models[0].size, len(models) - 1))
-    for k, model in enumerate(models[1:], start=1):
-        columns[k, :, k - 1] = model
-    return columns.reshape(-1, len(models) - 1)
+def _level_columns(runs: Sequence[Values]) -> FloatArray:
+    """Change (K G, M) of all values by each free level, in the order of `level_points`."""
+    models = [run.model for run in runs]
+    if any(run.settings is not None for run in runs):
+        # One for all: a level that all runs change alike then drops out, as nothing tells it.
+        models = [np.mean(models, axis=0)] * len(runs)
+    columns = []
+    for k, run in enumerate(runs):
+        for points in level_points(run, first=k == 0):
+            column = np.zeros((len(runs), run.brdf.size))
+            column[k, points] = models[k][points]
+            columns.append(column.ravel())
+    return np.stack(columns, axis=-1)
+
+
+def level_points(run: Values, *, first: bool) -> list[BoolArray]:
+    """Masks (G,), without unit, of the points of each free level; of the `first`, of settings."""
+    if run.settings is None:
+        return [] if first else [np.ones(run.brdf.size, dtype=np.bool_)]
+    return [run.settings == setting for setting in np.unique(run.settings)]
+
+
+def _factors(
+    runs: Sequence[Values], excess: FloatArray, u_excess: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Level (K,) of each run relative to the first, and its u; NaN with levels of settings."""
+    if any(run.settings is not None for run in runs):
+        unknown = np.full(len(runs), np.nan)
+        return unknown, unknown
+    return np.concatenate([[1.0], 1 + excess]), np.concatenate([[0.0], u_excess])
+
+
+def _rank(columns: FloatArray) -> int:
+    """Number of levels that can be told apart."""
+    sizes = np.linalg.svd(columns, compute_uv=False)
+    return int(np.sum(sizes > _LEAST * np.max(sizes, initial=0.0)))
 
 
 def _u_difference(variance: FloatArray, common: FloatArray) -> FloatArray:

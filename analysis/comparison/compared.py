@@ -17,8 +17,10 @@ class Compared:
     """K runs at the G geometries that all have.
 
     names: of the runs. samples: theirs, empty where it is not known. points: number of points that
-    each run has. at: the points of the first run at the G geometries. brdf: (K, G) in 1/sr.
-    same_tile: one white tile gave all runs their scale.
+    each run has. at: the points of the first run at the G geometries. brdf: (K, G) in 1/sr; with
+    relative runs, on the level of the first absolute one; without one, relative to the mean of the
+    first run. same_tile: one white tile gave all runs their scale. relative: True for each run
+    without a level.
     """
 
     names: tuple[str, ...]
@@ -28,23 +30,61 @@ class Compared:
     brdf: FloatArray
     agreement: Agreement
     same_tile: bool
+    relative: tuple[bool, ...]
 
     @property
-    def runs(self) -> list[tuple[str, str, int, float, float]]:
-        """Name, sample, number of points, level and its u of each run, a ratio to the first."""
+    def shape_only(self) -> bool:
+        """True if a run has no level, so that the shapes alone are compared."""
+        return any(self.relative)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values in brackets, empty where all are relative."""
+        return "" if all(self.relative) else " (1/sr)"
+
+    @property
+    def runs(self) -> list[tuple[str, str, int, float | None, float | None]]:
+        """Name, sample, number of points, level and its u of each run, a ratio to the first.
+
+        The level is None where shapes alone are compared.
+        """
         a = self.agreement
-        levels = a.factors.tolist(), a.u_factors.tolist()
-        return list(zip(self.names, self.samples, self.points, *levels, strict=True))
+        pairs: list[tuple[float | None, float | None]] = [(None, None)] * len(self.names)
+        if not self.shape_only:
+            pairs = list(zip(a.factors.tolist(), a.u_factors.tolist(), strict=True))
+        named = zip(self.names, self.samples, self.points, pairs, strict=True)
+        return [(name, sample, points, *level) for name, sample, points, level in named]
 
     @property
     def headline(self) -> str:
         """Verdict in one sentence."""
         whole, shape = self.agreement.whole, self.agreement.shape
+        if self.shape_only:
+            said = "agree" if shape.agrees else "differ by more than their uncertainty explains"
+            return f"The runs {said} in their shape; their levels were not compared."
         if whole.agrees:
             return "The runs agree within their uncertainty."
         if shape.agrees:
             return "The runs agree in their shape, and differ in their level."
         return "The runs differ by more than their uncertainty explains."
+
+    @property
+    def agrees(self) -> bool:
+        """True if the runs agree in all that was compared."""
+        a = self.agreement
+        return a.shape.agrees if self.shape_only else a.whole.agrees
+
+    @property
+    def why_no_level(self) -> str:
+        """Sentence about the runs without a level, empty if all have one."""
+        if not self.shape_only:
+            return ""
+        pairs = zip(self.names, self.relative, strict=True)
+        names = ", ".join(name for name, relative in pairs if relative)
+        return (
+            f"measured without a white tile, so without a level: {names}; all values are brought "
+            "to one level, for each lamp setting of these runs"
+        )
 
     @property
     def difference_in_u(self) -> FloatArray:
@@ -72,6 +112,8 @@ class Compared:
         return f"θi {i:g}°, θr {r:g}°, Δφ {phi:g}°"
 
 
-def level_text(level: float, u: float) -> str:
+def level_text(level: float | None, u: float | None) -> str:
     """Return a run's level with its u; of the first, which has none, the number alone."""
+    if level is None:
+        return "not compared"
     return format_value(level, u) if u else f"{level:g}"

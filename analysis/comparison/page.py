@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.comparison.agreement import DISAGREE
+from analysis.comparison.agreement import DISAGREE, Test
 from analysis.comparison.compared import Compared, level_text
 from analysis.data.sweeps import Sweep, signed_view, sweeps
 from analysis.report.figures.charts import MAX_SWEEPS, margins
@@ -51,23 +51,33 @@ def _head(compared: Compared) -> str:
 
 def _verdict(compared: Compared) -> str:
     a = compared.agreement
-    kind = "adequate" if a.whole.agrees else "warning"
-    tile = "one white tile, whose certificate cancels"
-    if not compared.same_tile:
-        tile = "errors of the runs' certificates count as independent"
+    kind = "adequate" if compared.agrees else "warning"
+    free = f"levels left free, {_test_text(a.shape)}"
+    reason = compared.why_no_level
+    told = f"With {free}. {reason[:1].upper()}{reason[1:]}"
+    if not compared.shape_only:
+        tile = "one white tile, whose certificate cancels"
+        if not compared.same_tile:
+            tile = "errors of the runs' certificates count as independent"
+        told = f"{_test_text(a.whole)}; with {free}. Scale: {tile}"
     return (
         f'<section class="verdict {kind}">\n<p class="state">'
-        f"{'agreement' if a.whole.agrees else 'difference'}</p>\n"
-        f'<p class="headline">{escaped(compared.headline)}</p>\n<p>'
-        f"χ² = {short_number(a.whole.chi2, 4)} with {a.whole.dof} degrees of freedom, probability "
-        f"{short_number(a.whole.probability, 2)} (below {DISAGREE:g} runs that agree would seldom "
-        f"differ as much); with levels left free χ² = {short_number(a.shape.chi2, 4)} with "
-        f"{a.shape.dof}, probability {short_number(a.shape.probability, 2)}. Scale: {tile}.</p>\n"
-        "</section>"
+        f"{'agreement' if compared.agrees else 'difference'}</p>\n"
+        f'<p class="headline">{escaped(compared.headline)}</p>\n<p>{escaped(told)}. Below a '
+        f"probability of {DISAGREE:g}, runs that agree would seldom differ as much.</p>\n</section>"
+    )
+
+
+def _test_text(test: Test) -> str:
+    return (
+        f"χ² = {short_number(test.chi2, 4)} with {test.dof} degrees of freedom, probability "
+        f"{short_number(test.probability, 2)}"
     )
 
 
 def _levels(compared: Compared) -> str:
+    if compared.shape_only:
+        return ""
     rows = (
         row_html((_run(compared, k), f"#{points}", f"#{level_text(level, u)}"))
         for k, (_, _, points, level, u) in enumerate(compared.runs)
@@ -104,12 +114,15 @@ def _charts(compared: Compared) -> str:
         handles, labels = canvas.axes[0].get_legend_handles_labels()
         canvas.legend(handles, labels, loc="upper left", ncols=4, frameon=False)
 
+    quantity = "BRDF" if compared.unit else "relative BRDF"
+    level = ", all on one level" if compared.shape_only else ""
     svg = svg_of(0.7 + _ROW_IN * rows, draw, "compared")
     more = len(sweeps(compared.at)) - len(shown)
     left_out = f" {more} more planes are not drawn." if more > 0 else ""
     caption = (
-        "Above: BRDF of each run with its independent u (k = 1). Below: difference to run 1 in its "
-        f"standard uncertainty; the band is ±2 u.{left_out} {escaped(_legend(compared))}"
+        f"Above: {quantity} of each run with its independent u (k = 1){level}. Below: difference "
+        "to run 1 in its standard uncertainty; the band is ±2 u."
+        f"{left_out} {escaped(_legend(compared))}"
     )
     chart = figure_html([svg], "BRDF of all runs, and differences", caption)
     return f'<h2 id="curves">Curves and differences</h2>\n{chart}'
@@ -142,7 +155,7 @@ def _panel(upper: Axes, lower: Axes, compared: Compared, sweep: Sweep) -> None:
     low, high = (float(f(compared.brdf[:, sweep.points])) for f in (np.min, np.max))
     upper.set_ylim(min(0.0, 1.08 * low), 1.08 * max(high, 0.0) or 1.0)
     set_symmetric_axis(lower, [deviations], 3.0)
-    upper.set_ylabel("BRDF (1/sr)")
+    upper.set_ylabel(f"BRDF{compared.unit}" if compared.unit else "relative BRDF")
     lower.set_ylabel("difference (u)")
     lower.set_xlabel("view angle θᵣ (°)")
 
@@ -150,9 +163,11 @@ def _panel(upper: Axes, lower: Axes, compared: Compared, sweep: Sweep) -> None:
 def _repeatability(compared: Compared) -> str:
     scatter, expected = (100 * value for value in compared.repeatability)
     worst = int(np.argmax(compared.agreement.scatter))
+    apart = "Brought to one level, the runs" if compared.shape_only else "The runs"
     return (
-        '<h2 id="repeatability">Repeatability</h2>\n<p>The runs scatter by '
-        f"{short_number(scatter, 3)} % of their mean, root mean square over the geometries; noise "
+        '<h2 id="repeatability">Repeatability</h2>\n<p>'
+        f"{apart} scatter by {short_number(scatter, 3)} % of their mean, root mean square over the "
+        "geometries; noise "
         f"and other independent errors explain {short_number(expected, 3)} %. Most at "
         f"{compared.angles(worst)}: "
         f"{short_number(100 * float(compared.agreement.scatter[worst]), 3)} %.</p>"
@@ -162,7 +177,7 @@ def _repeatability(compared: Compared) -> str:
 def _differences(compared: Compared) -> str:
     """Table of all geometries, up to a length that a page bears."""
     numbers = range(1, len(compared.names) + 1)
-    heads = ["θᵢ (°)", "θᵣ (°)", "Δφ (°)", *(f"Run {k} (1/sr)" for k in numbers)]
+    heads = ["θᵢ (°)", "θᵣ (°)", "Δφ (°)", *(f"Run {k}{compared.unit}" for k in numbers)]
     heads += [*(f"Run {k} − 1 (u)" for k in numbers[1:]), "Scatter (%)"]
     rows = [_geometry_row(compared, n) for n in range(min(compared.at.size, _MOST_ROWS))]
     left_out = compared.at.size - len(rows)

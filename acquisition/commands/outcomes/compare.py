@@ -18,9 +18,11 @@ from analysis.choice.choice import choose
 from analysis.comparison.agreement import Test, Values, agreement
 from analysis.comparison.common_geometries import SAME_DEG, common_geometries
 from analysis.comparison.compared import Compared, level_text
+from analysis.comparison.levels import on_one_level
 from analysis.comparison.page import comparison_html
-from analysis.data.covariance import Covariance, full_covariance
+from analysis.data.covariance import LAMP_LEVEL, Covariance, full_covariance
 from analysis.fit.certificate import CERTIFICATE
+from analysis.fit.relative_scale import normalise_lamp_levels
 from instrument.errors import InputError
 from instrument.geometry import BoolArray, IntArray
 from instrument.text.atomic_file import write_whole
@@ -31,7 +33,7 @@ def compare_sources(paths: Sequence[Path], page: Path | None, *, as_json: bool) 
     """Compare two or more runs or tables at the geometries that all have, and print the outcome.
 
     page: file for the same with charts, in HTML. Raises `InputError` for fewer than two sources,
-    for one without BRDF or without u, and for sources that have no geometry in common.
+    for one without u, and for sources that have no geometry in common.
     """
     _check(paths, page)
     sources = [_source(path) for path in paths]
@@ -43,6 +45,9 @@ def compare_sources(paths: Sequence[Path], page: Path | None, *, as_json: bool) 
         )
     same = same_tile(sources)
     runs = [_values(source, kept) for source, kept in zip(sources, common, strict=True)]
+    relative = tuple(m.relative for m in measured)
+    if any(relative):
+        runs = _shapes(runs, relative)
     found = Compared(
         names=tuple(printable(path.name or str(path)) for path in paths),
         samples=tuple(printable(source.sample) for source in sources),
@@ -51,7 +56,9 @@ def compare_sources(paths: Sequence[Path], page: Path | None, *, as_json: bool) 
         brdf=np.stack([run.brdf for run in runs]),
         agreement=agreement(runs, (CERTIFICATE,) if same else ()),
         same_tile=same,
+        relative=relative,
     )
+    _require_a_shape(found)
     if page is not None:
         write_whole(page, comparison_html(found))
     if as_json:
@@ -73,11 +80,6 @@ def _check(paths: Sequence[Path], page: Path | None) -> None:
 def _source(path: Path) -> Source:
     """Read a source whose values can be compared."""
     source = read_source(path, Wanted())
-    if source.measurements.relative:
-        raise InputError(
-            f"{path}: measured without a white tile: its values are relative, and so have no "
-            "level to compare; measure with a white tile"
-        )
     if source.measurements.u_random is None:
         raise InputError(f"{path}: states no uncertainty: add a column u_brdf, in 1/sr")
     return source
@@ -107,9 +109,33 @@ def _values(source: Source, kept: IntArray) -> Values:
     best = choice.best
     if best is None:
         raise InputError(f"no model could be fitted, which the comparison needs: {choice.reason}")
+    m = normalise_lamp_levels(m, best.brdf)
     whole = full_covariance(m, best.brdf)
-    covariance = Covariance(whole.variance[kept], whole.common[kept], whole.names)
-    return Values(brdf=m.brdf[kept], covariance=covariance, model=best.predicted[kept])
+    return Values(
+        brdf=m.brdf[kept],
+        covariance=Covariance(whole.variance[kept], whole.common[kept], whole.names),
+        model=best.predicted[kept],
+        settings=m.lamp_setting[kept] if m.free_levels else None,
+    )
+
+
+def _shapes(runs: Sequence[Values], relative: tuple[bool, ...]) -> list[Values]:
+    """Runs brought to the level of the first absolute one, else to that of the first, as 1."""
+    reference = relative.index(False) if False in relative else None
+    try:
+        return on_one_level(runs, (LAMP_LEVEL, CERTIFICATE), reference)
+    except ValueError as error:
+        raise InputError(f"gonio compare: {error}; name runs that have measured light") from None
+
+
+def _require_a_shape(found: Compared) -> None:
+    """Raise `InputError` where the unknown levels leave nothing to compare."""
+    if found.shape_only and found.agreement.shape.dof < 1:
+        raise InputError(
+            f"the {found.at.size} geometries that are common to all tell the levels of "
+            f"{', '.join(n for n, r in zip(found.names, found.relative, strict=True) if r)} and "
+            "nothing else, as no white tile was measured; allowed: two or more at one lamp setting"
+        )
 
 
 def _mask(kept: IntArray, size: int) -> BoolArray:
@@ -127,12 +153,16 @@ def _print(found: Compared) -> None:
     ]
     print_lines(["", *table_lines(("run", "sample", "points", "level ± u"), rows, out.width), ""])
     k, n = found.largest
-    tile = "one white tile: the errors of its certificate cancel"
+    free = f"with levels left free: {_test_text(a.shape)}"
+    told = (free, found.why_no_level)
+    if not found.shape_only:
+        tile = "one white tile: the errors of its certificate cancel"
+        scales = tile if found.same_tile else "the errors of their scales count as independent"
+        told = (f"as they are: {_test_text(a.whole)}; {free}", scales)
     print_notes(
         (
             f"{found.at.size} geometries are common to all",
-            f"as they are: {_test_text(a.whole)}; with levels left free: {_test_text(a.shape)}",
-            tile if found.same_tile else "the errors of their scales count as independent",
+            *told,
             f"largest difference: {found.names[k]} by {found.difference_in_u[k, n]:+.1f} u at "
             f"{found.angles(n)}",
             f"the runs scatter by {100 * scatter:.3g} % of their mean (rms over the geometries), "
@@ -148,11 +178,12 @@ def _test_text(test: Test) -> str:
 def _json(found: Compared) -> dict[str, Any]:
     a, (scatter, expected) = found.agreement, found.repeatability
     return {
-        "agree": a.whole.agrees,
+        "levels_compared": not found.shape_only,
+        "agree": None if found.shape_only else a.whole.agrees,
         "agree_in_shape": a.shape.agrees,
-        "chi2": a.whole.chi2,
-        "dof": a.whole.dof,
-        "probability": a.whole.probability,
+        "chi2": None if found.shape_only else a.whole.chi2,
+        "dof": None if found.shape_only else a.whole.dof,
+        "probability": None if found.shape_only else a.whole.probability,
         "chi2_shape": a.shape.chi2,
         "dof_shape": a.shape.dof,
         "probability_shape": a.shape.probability,

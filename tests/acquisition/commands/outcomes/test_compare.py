@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.support.command import finished_run
@@ -73,6 +75,76 @@ def test_a_run_and_its_table_are_the_same(days: list[Path]) -> None:
     found = json.loads(done.stdout)
     assert found["chi2"] == pytest.approx(0, abs=1e-6)
     assert found["repeatability"]["scatter_relative"] == 0
+
+
+def relative_table(run: Path, path: Path, *, matt: bool = False) -> Path:
+    """The run's table as without a white tile: a level of its own for each incidence.
+
+    matt: the values of Lambert's law stand in it.
+    """
+    with (run / "measurements.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    levels = np.random.default_rng(3).uniform(20, 4000, 99).tolist()
+    for row in rows:
+        radiance = 1.0 if matt else float(row["radiance"])
+        radiance *= levels[int(float(row["theta_i_deg"]))]
+        row |= {"brdf": "", "u_brdf": "", "radiance": repr(radiance)}
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+    return path
+
+
+@pytest.mark.parametrize(("first", "agree"), [(0, True), (1, False)])
+def test_a_relative_run_is_compared_in_its_shape(
+    days: list[Path], tmp_path: Path, first: int, agree: bool
+) -> None:
+    sources = [days[0], relative_table(days[1], tmp_path / "relative.csv", matt=not agree)]
+    done = gonio("compare", *(sources[first:] + sources[:first]), "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["agree_in_shape"] is agree
+    assert not found["levels_compared"]
+    assert [found[name] for name in ("agree", "chi2", "dof")] == [None, None, None]
+    assert [run["level"] for run in found["runs"]] == [None, None]
+    brdf = np.array(found["geometries"]["brdf"])
+    np.testing.assert_allclose(brdf[0], brdf[1], rtol=0.5)  # on one level
+    settings = len(set(found["geometries"]["theta_i_deg"]))
+    assert found["dof_shape"] == brdf.shape[1] - settings
+
+
+def test_relative_runs_alone_have_no_unit(days: list[Path], tmp_path: Path) -> None:
+    tables = [relative_table(day, tmp_path / f"{day.parent.name}.csv") for day in days]
+    page = tmp_path / "days.html"
+    done = gonio("compare", *tables, "--out", page)
+    assert done.returncode == 0, done.stderr
+    said = " ".join(done.stdout.split())
+    assert "agree in their shape; their levels were not compared" in said
+    assert "measured without a white tile, so without a level: day1.csv, day2.csv" in said
+    html = page.read_text()
+    assert "levels were not compared" in html
+    assert "1/sr" not in html
+    assert "Levels</h2>" not in html
+
+
+def test_levels_alone_are_nothing_to_compare(days: list[Path], tmp_path: Path) -> None:
+    """One view at each incidence is common."""
+    relative = relative_table(days[0], tmp_path / "relative.csv")
+    with relative.open(newline="") as file:
+        places = {row["theta_i_deg"]: row["theta_r_deg"] for row in csv.DictReader(file)}
+    lines = [
+        f"{theta_i},{float(theta_r) - step},0,0.2,0.01"
+        for theta_i, theta_r in places.items()
+        for step in (0, 1.3, 2.6)
+    ]
+    head = "theta_i_deg,theta_r_deg,dphi_deg,brdf,u_brdf"
+    (tmp_path / "few.csv").write_text("\n".join([head, *lines, ""]))
+    page = tmp_path / "page.html"
+    done = gonio("compare", tmp_path / "few.csv", relative, "--out", page)
+    assert done.returncode == 2
+    assert "tell the levels of relative.csv and nothing else" in " ".join(done.stderr.split())
+    assert not page.exists()
 
 
 @pytest.mark.parametrize(
