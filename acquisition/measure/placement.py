@@ -8,6 +8,7 @@ along the surface. The second is computed: no image at one height shows it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,42 +62,47 @@ def tilt_deg(angle_deg: FloatArray, height_mm: float, distance_mm: float) -> Flo
 
 
 def placement_u_dn(
-    image: NDArray[Any], dark: FloatArray, window: Window, placement: Placement
+    image: NDArray[Any],
+    dark: FloatArray,
+    window: Window,
+    placement: Placement,
+    linear: Callable[[NDArray[Any]], NDArray[Any]] = np.asarray,
 ) -> tuple[float, float]:
     """Return the effect in DN of a surface u_mm closer to the camera: first and second order.
 
-    `image`: one frame, `dark`: mean dark, both (rows, columns) in DN. The first is signed.
+    `image`: one frame, `dark`: mean dark, both (rows, columns) in DN; `linear` makes counts linear
+    in light. The first is signed.
     """
-    first, second = _shifted_window(image, dark, window, placement.u_mm)
-    signal = window.mean(image[window.crop] - dark[window.crop])
-    return first + signal * placement.u_irradiance, second
-
-
-def _shifted_window(
-    image: np.ndarray, dark: FloatArray, window: Window, u_mm: float
-) -> tuple[float, float]:
-    """Return how the window's mean changes by the shift of the image: first and second order.
-
-    Estimated by shifting the window over the measured image by the same amount, to both sides.
-    """
-    shift = np.array(window.shift_px_per_mm[::-1]) * u_mm  # rows, columns
+    shift = np.array(window.shift_px_per_mm[::-1]) * placement.u_mm  # rows, columns
     whole = np.rint(shift).astype(int)
     if not whole.any():
         whole[np.argmax(np.abs(shift))] = 1 if shift[np.argmax(np.abs(shift))] >= 0 else -1
-    ahead, behind = (_moved(window.crop, by * whole) for by in (1, -1))
-    inside = all(
-        s.start >= 0 and s.stop <= size
-        for crop in (ahead, behind)
-        for s, size in zip(crop, dark.shape, strict=True)
-    )
-    if not u_mm or not window.inside_frame or not inside:
-        return 0.0, 0.0
+    box, inside = _box(window.crop, np.abs(whole), dark.shape)
+    light = linear(image[box]) - dark[box]
+    here = _moved(window.crop, -np.array([s.start for s in box]))
+    signal = window.mean(light[here])
+    irradiance = signal * placement.u_irradiance
+    if not placement.u_mm or not window.inside_frame or not inside:
+        return irradiance, 0.0
     part = float(np.linalg.norm(shift) / np.linalg.norm(whole))
-    before, here, after = (
-        window.mean(image[crop] - dark[crop]) for crop in (behind, window.crop, ahead)
-    )
+    # The window is shifted over the measured image by the shift of the image, to both sides.
+    before, after = (window.mean(light[_moved(here, by * whole)]) for by in (-1, 1))
+    first = -part * (after - before) / 2
     # A normal displacement x of standard uncertainty u has rms(x^2) = sqrt(3) u^2.
-    return -part * (after - before) / 2, part**2 * np.sqrt(3) * abs(after + before - 2 * here) / 2
+    second = part**2 * np.sqrt(3) * abs(after + before - 2 * signal) / 2
+    return first + irradiance, second
+
+
+def _box(
+    crop: tuple[slice, slice], margin: IntArray, shape: tuple[int, ...]
+) -> tuple[tuple[slice, slice], bool]:
+    """Return a crop with a margin (rows, columns) around it; without one where that leaves shape.
+
+    The second is False then.
+    """
+    wide = [slice(s.start - n, s.stop + n) for s, n in zip(crop, margin.tolist(), strict=True)]
+    inside = all(s.start >= 0 and s.stop <= size for s, size in zip(wide, shape, strict=True))
+    return ((wide[0], wide[1]) if inside else crop), inside
 
 
 def _moved(crop: tuple[slice, slice], by: IntArray) -> tuple[slice, slice]:

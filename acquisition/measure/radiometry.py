@@ -115,8 +115,8 @@ def measure(
     u_dark_noise = _u_noise(window, dark_variance / dark.frames)
     # In another pose the light in a dark is between none and twice as much, with equal probability.
     u_light = dark.light_dn * float(window.weights.sum()) / math.sqrt(3.0)
-    first = camera.linear_dn(frames[0].image)
-    u_placement, u_texture = placement_u_dn(first, dark.mean, window, placement)
+    first = frames[0].image
+    u_placement, u_texture = placement_u_dn(first, dark.mean, window, placement, camera.linear_dn)
     u_left_out = (hot_share + dead_share) * _spread(mean - dark_mean, window)
     # A saturated pixel is short of its true count by up to full scale, or more.
     u_saturated = saturated_weight * (camera.max_dn - camera.black_level_dn)

@@ -60,22 +60,21 @@ def dark_rounding_dn(
     differ in offset that need not be so: the part of their differences in the spread of all counts
     is taken of the error that the noise of one pixel would leave.
     """
-    inside = weights > 0
-    level_of, variance_of, part = mean[inside], variance[inside], weights[inside]
-    typical = np.median(level_of[:: max(1, level_of.size // _ENOUGH)]) if level_of.size else 0.0
-    near = np.abs(level_of - typical) < _FAR_DN
-    if not near.any():
+    step = max(1, mean.size // _ENOUGH)
+    some = mean.ravel()[::step][weights.ravel()[::step] > 0]
+    typical = np.partition(some, some.size // 2)[some.size // 2] if some.size else 0.0
+    far = np.abs(mean - typical) >= _FAR_DN
+    part = np.where(far, 0.0, weights) if far.any() else weights
+    if not part.any():
         return 0.0, 0.0
-    if not near.all():
-        level_of, variance_of, part = level_of[near], variance_of[near], part[near]
     part = part / part.sum()
-    level = float(part @ level_of)
-    between = float(part @ np.square(level_of - level))
-    temporal = float(part @ variance_of)
+    level = float(np.vdot(part, mean))
+    between = float(np.vdot(part, np.square(mean - level)))
+    temporal = float(np.vdot(part, variance))
     total = between + temporal * (frames - 1) / frames
     if total > 1.0:
         return 0.0, 0.0
-    error, u_error, noise = _normal_error(level, total, frames / float(part @ part))
+    error, u_error, noise = _normal_error(level, total, frames / float(np.vdot(part, part)))
     pattern = max(between - temporal / frames, 0.0)
     u_pattern = rounding_u_dn(max(noise - pattern, 0.0)) * np.sqrt(pattern / max(total, 1e-9))
     return error, float(np.hypot(u_error, u_pattern))

@@ -99,7 +99,7 @@ class CameraConfig(Section):
             return counts
         own = self._measured
         table = _linear_counts_dn(own.curve, own.black_dn, self.max_dn)
-        return np.asarray(table[np.minimum(counts, self.max_dn)])
+        return np.asarray(np.take(table, counts, mode="clip"))
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
         """Check the order of exposures, the axis inside the image, and the black level."""
