@@ -135,8 +135,10 @@ def fit(
     format: Annotated[
         str,
         typer.Option(
-            help="run, csv, astm, zemax, pab, alta or curet; auto: by content.",
-            autocompletion=_among(("auto", "run", "csv", "astm", "zemax", "pab", "alta", "curet")),
+            help="run, csv, astm, zemax, pab, alta, merl or curet; auto: by content.",
+            autocompletion=_among(
+                ("auto", "run", "csv", "astm", "zemax", "pab", "alta", "merl", "curet")
+            ),
         ),
     ] = "auto",
     sample: Annotated[int | None, typer.Option(help="Number of the material, for curet.")] = None,

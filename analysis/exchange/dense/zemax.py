@@ -49,12 +49,12 @@ MARKS_KEY = "marks"
 
 
 def files(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
-    """Yield STEM.bsdf, and STEM.u.csv where u is known."""
+    """Yield STEM.bsdf, and STEM.zemax.u.csv where u is known."""
     export.require_absolute("zemax")
     grid = specular_grid(export.table, "zemax")
     lines = [*(f"# {line}" for line in _comments(export, grid)), *_header(grid), *_data(grid), ""]
     yield f"{stem}.bsdf", "\n".join(lines).encode(errors="replace")
-    yield from u_table(export, stem)
+    yield from u_table(export, stem, "zemax")
 
 
 def _comments(export: Export, grid: SpecularGrid) -> Iterator[str]:

@@ -46,7 +46,7 @@ _ROW = "rows theta_i,phi_i,theta_s,phi_s,BRDF after a line VARS"
 
 
 def files(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
-    """Yield STEM.astm, and STEM.u.csv where u is known."""
+    """Yield STEM.astm, and STEM.astm.u.csv where u is known."""
     export.require_absolute("astm")
     angles = export.table.geometry
     header = [_KEYWORD.sub(r'"\1"', line) for line in stated(export)]
@@ -62,7 +62,7 @@ def files(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
         "",
     ]
     yield f"{stem}.astm", "\n".join(lines).encode(errors="replace")
-    yield from u_table(export, stem)
+    yield from u_table(export, stem, "astm")
 
 
 def _value_name(export: Export) -> str:

@@ -24,8 +24,8 @@ def exact(value: float) -> str:
     return repr(float(value))
 
 
-def u_table(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
-    """Yield STEM.u.csv, with values and u, for a format without a place for u.
+def u_table(export: Export, stem: str, name: str) -> Iterator[tuple[str, bytes]]:
+    """Yield STEM.NAME.u.csv, with values and u, for the format `name` without a place for u.
 
     Yields nothing where no u is known. `gonio fit` reads the file if all are.
     """
@@ -40,4 +40,4 @@ def u_table(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
     lines = ["theta_i_deg,theta_r_deg,dphi_deg,brdf,u_brdf"]
     for *row, u in rows:
         lines.append(",".join([*map(exact, row), exact(u) if np.isfinite(u) else ""]))
-    yield f"{stem}.u.csv", "\n".join([*lines, ""]).encode()
+    yield f"{stem}.{name}.u.csv", "\n".join([*lines, ""]).encode()

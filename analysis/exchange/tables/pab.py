@@ -43,14 +43,14 @@ _ROW = "rows of theta phi BSDF"
 
 
 def files(export: Export, stem: str) -> Iterator[tuple[str, bytes]]:
-    """Yield STEM.pab, STEM_2.pab, ... by incidence as measured, and STEM.u.csv where u is known."""
+    """Yield STEM.pab, STEM_2.pab, ... by incidence as measured; STEM.pab.u.csv where u is known."""
     export.require_absolute("pab")
     theta_i = export.table.geometry.theta_i_deg
     for n, angle in enumerate(dict.fromkeys(theta_i.tolist()), 1):
         lines = [*_header(export, angle), *_rows(export.table, theta_i == angle), ""]
         name = f"{stem}.pab" if n == 1 else f"{stem}_{n}.pab"
         yield name, "\n".join(lines).encode(errors="replace")
-    yield from u_table(export, stem)
+    yield from u_table(export, stem, "pab")
 
 
 def _header(export: Export, theta_i: float) -> list[str]:

@@ -21,6 +21,13 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return finished_run(small_demo(folder, "lambert, oren_nayar"), folder / "run")
 
 
+def test_exports_of_one_name_into_one_folder_do_not_collide(run: Path, tmp_path: Path) -> None:
+    for name in ("astm", "pab", "merl", "radiance", "mitsuba"):
+        path = tmp_path / f"mine{FORMATS[name].suffix}"
+        done = gonio("export", run, "--format", name, "-o", path)
+        assert done.returncode == 0, done.stderr
+
+
 def test_csv_is_the_table_of_the_run(run: Path, tmp_path: Path) -> None:
     done = gonio("export", run, "--format", "csv", "-o", tmp_path / "mine.csv")
     assert done.returncode == 0, done.stderr
@@ -42,7 +49,7 @@ def test_a_table_for_another_program_holds_the_run_and_can_be_fitted(
     assert set(theirs.brdf) <= set(ours.brdf)
     assert theirs.size == np.sum(np.isin(ours.theta_i_deg, theirs.theta_i_deg))
     assert gonio("fit", path, "--models", "lambert").returncode == 0
-    if (beside := path.with_suffix(".u.csv")).exists():
+    if (beside := path.with_suffix(f".{name}.u.csv")).exists():
         with_u = read_source(beside, Wanted()).measurements
         assert with_u.u_random is not None
         assert sorted(with_u.brdf) == sorted(ours.brdf)

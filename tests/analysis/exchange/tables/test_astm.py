@@ -36,7 +36,7 @@ def test_another_reader_finds_the_values_as_measured(seed: int) -> None:
     dphi = np.degrees(numbers[:, 3] - numbers[:, 1])
     np.testing.assert_allclose(dphi, angles.dphi_deg, rtol=1e-14)
     assert [more_name for more_name, _ in more] == (
-        [] if np.isnan(export.table.u_brdf).all() else ["mine.u.csv"]
+        [] if np.isnan(export.table.u_brdf).all() else ["mine.astm.u.csv"]
     )
 
 
