@@ -177,7 +177,8 @@ def fit(
         ),
     ] = "auto",
     out: Annotated[
-        Path | None, typer.Option("--out", help="New folder for report.html and fit.json.")
+        Path | None,
+        typer.Option("--out", help="New folder for report.html, fit.json, measurements.csv."),
     ] = None,
     json: Json = False,
 ) -> None:

@@ -1,4 +1,4 @@
-"""Files of a fit of any source: the report, as a run has it, and fit.json."""
+"""Files of a fit of any source, as a run has them: report, fit.json and measurements.csv."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from acquisition.commands.outcomes.fitted_table import fitted_table
 from acquisition.results.report_inputs import candidates_of
 from acquisition.results.sources import Source
 from acquisition.results.summary import VERDICTS
@@ -29,6 +30,7 @@ def fit_files(
     data = _report_data(path, source, choice, str(fit["reason"]), notes)
     return {
         "fit.json": json.dumps(fit, indent=2, allow_nan=False),
+        "measurements.csv": fitted_table(source),
         "report.html": report_html(data),
     }
 

@@ -37,7 +37,8 @@ def test_a_table_gets_the_report_of_a_run(tmp_path: Path) -> None:
     table, folder = lambertian(tmp_path), tmp_path / "fit"
     done = gonio("fit", table, "--models", "lambert,minnaert", "--out", folder)
     assert done.returncode == 0, done.stderr
-    assert sorted(file.name for file in folder.iterdir()) == ["fit.json", "report.html"]
+    names = ["fit.json", "measurements.csv", "report.html"]
+    assert sorted(file.name for file in folder.iterdir()) == names
     assert str(folder / "report.html") in done.stderr.replace("\n", "")
     found = json.loads((folder / "fit.json").read_text())
     assert found["chosen"] == "lambert"
@@ -56,6 +57,24 @@ def test_what_is_printed_is_in_the_report(tmp_path: Path) -> None:
     assert json.loads(done.stdout) == json.loads((folder / "fit.json").read_text())
     for note in json.loads(done.stdout)["notes"]:
         assert note["text"] in page_of(folder)
+
+
+@pytest.mark.parametrize("options", [(), ("--u-shared", "1%"), ("--relative",)])
+@pytest.mark.parametrize("u", [True, False])
+def test_its_table_gives_the_same_fit(tmp_path: Path, u: bool, options: tuple[str, ...]) -> None:
+    """Values with an error that all share, too; relative ones keep their form, not their level."""
+    table, folder = lambertian(tmp_path, u=u), tmp_path / "fit"
+    models = ("--models", "lambert,minnaert", "--json")
+    first = gonio("fit", table, *models, *options, "--out", folder)
+    again = gonio("fit", folder / "measurements.csv", *models)
+    assert again.returncode == first.returncode, again.stderr
+    ours, theirs = (json.loads(done.stdout) for done in (first, again))
+    assert (ours["chosen"], ours["verdict"]) == (theirs["chosen"], theirs["verdict"])
+    if not options or "--u-shared" in options:
+        for one, other in zip(ours["candidates"], theirs["candidates"], strict=True):
+            for name, found in one["parameters"].items():
+                assert other["parameters"][name]["value"] == pytest.approx(found["value"], rel=1e-6)
+                assert other["parameters"][name]["u"] == pytest.approx(found["u"], rel=1e-4)
 
 
 @pytest.mark.parametrize("u", [True, False])
