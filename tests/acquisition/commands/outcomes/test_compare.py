@@ -5,14 +5,17 @@ from __future__ import annotations
 import csv
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from acquisition.commands.outcomes import compare
+from analysis.choice.choice import choose
 from tests.support.command import finished_run
 from tests.support.command import gonio_here as gonio
-from tests.support.scans import small_demo
+from tests.support.scans import TWO_MODELS, small_demo
 
 TILE = re.compile(r"white_tile: .*")
 EXACT_TILE = "white_tile: {reflectance: 0.99, u_reflectance: 0.0, theta_r_deg: 10.0}"
@@ -21,7 +24,7 @@ EXACT_TILE = "white_tile: {reflectance: 0.99, u_reflectance: 0.0, theta_r_deg: 1
 def measured(folder: Path, seed: int, **changes: str) -> Path:
     """Run of a day: of the tile, whose true value a seed draws, nothing is uncertain here."""
     folder.mkdir()
-    protocol = small_demo(folder)
+    protocol = small_demo(folder, TWO_MODELS)
     rig = folder / "small_rig.yaml"
     rig.write_text(re.sub(r"seed: \d+", f"seed: {seed}", rig.read_text()))
     text = TILE.sub(EXACT_TILE, protocol.read_text()).replace("mottling: 0.02", "mottling: 0.0")
@@ -35,6 +38,14 @@ def measured(folder: Path, seed: int, **changes: str) -> Path:
 def days(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     folder = tmp_path_factory.mktemp("days")
     return [measured(folder / f"day{seed}", seed) for seed in (1, 2)]
+
+
+@pytest.fixture(autouse=True)
+def few_models(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fit the samples' own model and its diffuse part, but for the first test, which fits all."""
+    if request.function is not test_days_of_one_sample_agree:
+        models = ["oren_nayar", "oren_nayar+torrance_sparrow"]
+        monkeypatch.setattr(compare, "choose", partial(choose, models=models))
 
 
 def test_days_of_one_sample_agree(days: list[Path]) -> None:
