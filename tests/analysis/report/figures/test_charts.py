@@ -14,7 +14,7 @@ from analysis.report.style import svg_file
 from analysis.report.sweeps import group_sweeps
 from tests.support.analysis.report_data import data_of, without_tile, words
 
-VIEWS = tuple(np.arange(-60.0, 61.0, 30.0))
+VIEWS = tuple(np.arange(-70.0, 71.0, 10.0))
 
 
 def _shape(page: str) -> str:
