@@ -44,8 +44,14 @@ class Forecast:
         return Information.of(self.problem, self.x)
 
     def u(self) -> dict[str, float]:
-        """Standard uncertainty of each parameter, in its unit, by all points measured once."""
-        return self.information.u(np.ones(self.measurements.size))
+        """Standard uncertainty of each parameter, in its unit, by all points measured once.
+
+        Without those that relative values do not determine.
+        """
+        m = self.measurements
+        lost = unscaled_parameters(self.problem.model) if m.relative else frozenset[str]()
+        found = self.information.u(np.ones(m.size))
+        return {name: u for name, u in found.items() if name not in lost}
 
 
 def forecast(loaded: Loaded, plan: Plan, sample: AssumedSample) -> Forecast:

@@ -65,8 +65,15 @@ def quicker(loaded: Loaded, settings: Settings) -> tuple[Loaded, Plan]:
         setting: views[::-1] if number % 2 else views
         for number, (setting, views) in enumerate(settings.items())
     }
-    both = [with_settings(loaded, one) for one in (settings, falling)]
-    plans = [(one, make_plan(one)) for one in both]
+    plans, errors = [], []
+    for one in (settings, falling):
+        try:
+            ordered = with_settings(loaded, one)
+            plans.append((ordered, make_plan(ordered)))
+        except InputError as error:  # a keep-out zone may bar one order and not the other
+            errors.append(error)
+    if not plans:
+        raise errors[0]
     return min(plans, key=lambda pair: pair[1].duration_s)
 
 

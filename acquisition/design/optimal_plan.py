@@ -50,7 +50,8 @@ class OptimalPlan:
     """Chosen plan, with what each geometry is for, beside uniform sweeps.
 
     reasons: of each point of the plan, in its order. sweeps: the protocol's own. same_time: uniform
-    sweeps that take about the time of the chosen plan; None where the fewest views take more.
+    sweeps that take about the time of the chosen plan; None where the fewest views take more, or
+    a zone bars them.
     efficiency: least root of the summed variances that any choice of as many points, repetitions
     included, can have, over that of the chosen ones: at most 1. rivals: models that the plan tells
     apart, with the chi2 by which the best fit of each will miss the values. between: candidates
@@ -107,13 +108,23 @@ class Planner:
         return cls(loaded, sample, tuple(asked), own, points, every, listed, rivals)
 
     def chosen(self, count: int, seed: int = 0) -> tuple[tuple[Pick, ...], Planned]:
-        """Choose `count` candidates and plan them."""
+        """Choose `count` candidates and plan them.
+
+        Raises `InputError` where a keep-out zone bars the way from one to the next.
+        """
         picks = choose(self.listed, self.asked, count, rivals=self.rivals, seed=seed)
         poses = [self.points[pick.candidate] for pick in picks]
         order = list(settings_of(self.own))
         groups = grouped(poses)
         ordered = {setting: groups[setting] for setting in order if setting in groups}
-        return picks, self._planned(*quicker(self.loaded, ordered))
+        try:
+            return picks, self._planned(*quicker(self.loaded, ordered))
+        except InputError as error:
+            raise InputError(
+                f"--optimal {count}: {'; '.join(error.problems)}. The chosen geometries leave out "
+                "those on the protocol's way around the zone: choose another number, or leave the "
+                "views beside the zone out of the protocol"
+            ) from None
 
     def uniform(self, views: int) -> Planned:
         """Plan uniform sweeps of so many views at each setting of the lamp."""
@@ -140,7 +151,11 @@ class Planner:
         return self.uniform(low)
 
     def _duration_s(self, views: int) -> float:
-        return self._sweeps_of(views)[1].duration_s
+        """Duration of uniform sweeps; infinite where a keep-out zone bars them."""
+        try:
+            return self._sweeps_of(views)[1].duration_s
+        except InputError:
+            return float("inf")
 
     def _sweeps_of(self, views: int) -> tuple[Loaded, Plan]:
         return quicker(self.loaded, uniform(settings_of(self.own), views))
@@ -177,6 +192,11 @@ class Planner:
 
 
 def _require(count: int, least: int, most: int) -> None:
+    if most < least:
+        raise InputError(
+            f"the sweeps have {most} geometries that can be used, and {least} parameters are to be "
+            "determined; allowed: as many geometries or more: add views to the protocol"
+        )
     if not least <= count <= most:
         raise InputError(
             f"--optimal {count}; allowed: {least}, the parameters to determine, to {most}, the "

@@ -72,14 +72,20 @@ class Information:
         """
         return np.diag(self.prior) + (self.rows * counts[:, np.newaxis]).T @ self.rows
 
-    def covariance(self, counts: FloatArray) -> FloatArray:
-        """Covariance of all unknowns, (unknowns, unknowns), in units of domains and of shared u.
+    def root(self, counts: FloatArray) -> FloatArray:
+        """Root (unknowns, unknowns) of the unknowns' covariance, by a design of `counts` (N,).
 
-        The inverse of `matrix`, found from the rows, whose condition is milder.
+        In units of domains and of shared u: times its transpose, it is the inverse of `matrix`. It
+        is found from the rows, whose condition is milder, so that rows times it are exact where
+        the design leaves another unknown undetermined.
         """
         rows = self.rows * np.sqrt(counts)[:, np.newaxis]
         R = np.linalg.qr(np.vstack([rows, np.diag(np.sqrt(self.prior))]), mode="r")
-        root = np.linalg.inv(R)
+        return np.asarray(np.linalg.inv(R))
+
+    def covariance(self, counts: FloatArray) -> FloatArray:
+        """Covariance of all unknowns, (unknowns, unknowns), in units of domains and of shared u."""
+        root = self.root(counts)
         return np.asarray(root @ root.T)
 
     def u(self, counts: FloatArray) -> dict[str, float]:

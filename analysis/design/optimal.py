@@ -182,12 +182,12 @@ class _List:
 
     def _objective(self, chosen: BoolArray) -> float:
         """Criterion times time: the inverse of the information gained per second."""
-        known = Posterior.of(self.information, self.weights, chosen)
+        known = Posterior(self.information, self.weights, chosen)
         return known.criterion * self.costs.total_s(chosen)
 
     def _greedy(self, fixed: BoolArray, count: int) -> BoolArray:
         own = self.none
-        known = Posterior.of(self.information, self.weights, fixed)
+        known = Posterior(self.information, self.weights, fixed)
         for _ in range(count):
             point = self._next(known, fixed | own)[0]
             own[point] = True
@@ -206,7 +206,7 @@ class _List:
         own, best = start.copy(), self._objective(fixed | start)
         for _ in range(_ROUNDS):
             before = best
-            known = Posterior.of(self.information, self.weights, fixed | own)
+            known = Posterior(self.information, self.weights, fixed | own)
             for point in np.flatnonzero(own):
                 known.remove(int(point))
                 own[point] = False
@@ -221,7 +221,7 @@ class _List:
 
     def reasons(self, fixed: BoolArray, own: BoolArray) -> dict[int, str]:
         """Parameter that each of the `own` points (N,) is for: whose variance it lowers most."""
-        known = Posterior.of(self.information, self.weights, fixed | own)
+        known = Posterior(self.information, self.weights, fixed | own)
         return {
             int(k): self.asked[int(np.argmax(known.without(int(k)) / known.variance))]
             for k in np.flatnonzero(own)

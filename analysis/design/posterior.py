@@ -7,39 +7,46 @@ more or less changes that by one product of a column with itself (Sherman and Mo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from analysis.design.information import Information
 from instrument.geometry import BoolArray, FloatArray
 
+# Factors by which a point more or less may divide: beyond them too many digits would be lost.
+_SAFE = (1e-4, 1e6)
+
 
 @dataclass(slots=True)
 class Posterior:
-    """Uncertainty that a design of N candidates leaves; arrays change with `add` and `remove`.
+    """Uncertainty that a design of N candidates leaves; it changes with `add` and `remove`.
 
-    predicted: (N, N), covariance of the candidates' predicted values, in units of their own
-    independent u. cross: (N, P), covariance of the values with the P weighted parameters.
-    variance: (P,), of those. Each parameter is scaled by the root of its weight.
+    weights: (unknowns,). chosen: (N,), marks the design. predicted: (N, N), covariance of the
+    candidates' predicted values, in units of their own independent u. cross: (N, P), covariance of
+    the values with the P weighted parameters, each scaled by the root of its weight. variance:
+    (P,), of those.
     """
 
-    predicted: FloatArray
-    cross: FloatArray
-    variance: FloatArray
+    information: Information
+    weights: FloatArray
+    chosen: BoolArray
+    predicted: FloatArray = field(init=False)
+    cross: FloatArray = field(init=False)
+    variance: FloatArray = field(init=False)
 
-    @classmethod
-    def of(cls, information: Information, weights: FloatArray, chosen: BoolArray) -> Posterior:
-        """Uncertainty after those that `chosen` (N,) marks True, for `weights` (unknowns,)."""
-        inverse = information.covariance(chosen.astype(np.float64))
-        asked = np.flatnonzero(weights)
-        root = np.sqrt(weights[asked])
-        rows = information.rows
-        return cls(
-            predicted=rows @ inverse @ rows.T,
-            cross=rows @ inverse[:, asked] * root,
-            variance=np.diag(inverse)[asked] * root**2,
-        )
+    def __post_init__(self) -> None:
+        self.chosen = self.chosen.copy()
+        self._compute()
+
+    def _compute(self) -> None:
+        root = self.information.root(self.chosen.astype(np.float64))
+        asked = np.flatnonzero(self.weights)
+        own = root[asked] * np.sqrt(self.weights[asked])[:, np.newaxis]
+        values = self.information.rows @ root
+        self.predicted = values @ values.T
+        self.cross = values @ own.T
+        self.variance = np.square(own).sum(axis=1)
 
     @property
     def criterion(self) -> float:
@@ -48,24 +55,29 @@ class Posterior:
 
     def with_one_more(self) -> FloatArray:
         """Criterion (N,), in its own unit, with each candidate added."""
-        gain = np.square(self.cross).sum(axis=1) / (1 + np.diag(self.predicted))
-        return np.asarray(self.criterion - gain)
+        spread = 1 + np.maximum(np.diag(self.predicted), 0.0)
+        return np.asarray(self.criterion - np.square(self.cross).sum(axis=1) / spread)
 
     def without(self, point: int) -> FloatArray:
         """Variances (P,), in their own unit, without one of the points of the design."""
-        left = max(1 - float(self.predicted[point, point]), np.finfo(float).eps)
-        return np.asarray(self.variance + np.square(self.cross[point]) / left)
+        other = Posterior(self.information, self.weights, self.chosen)
+        other.remove(point)
+        return other.variance
 
     def add(self, point: int) -> None:
         """Measure a candidate."""
+        self.chosen[point] = True
         self._change(point, 1 + float(self.predicted[point, point]))
 
     def remove(self, point: int) -> None:
         """Take a point out of the design."""
-        left = max(1 - float(self.predicted[point, point]), np.finfo(float).eps)
-        self._change(point, -left)
+        self.chosen[point] = False
+        self._change(point, float(self.predicted[point, point]) - 1)
 
     def _change(self, point: int, by: float) -> None:
+        if not _SAFE[0] < abs(by) < _SAFE[1]:
+            self._compute()
+            return
         column, cross = self.predicted[:, point].copy(), self.cross[point].copy()
         self.variance = self.variance - np.square(cross) / by
         self.cross = self.cross - np.outer(column, cross) / by

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -101,14 +102,24 @@ def _curves(planner: Planner, found: OptimalPlan) -> Curves:
     """Plans of rising size, chosen and uniform, up to the protocol's own."""
     most = min(len(planner.points), max(len(found.sweeps.plan.points), len(found.reasons)))
     least = len(planner.every.x)
-    chosen = [planner.chosen(n)[1] for n in _sizes(least, most) if n != len(found.reasons)]
+    sizes = [n for n in _sizes(least, most) if n != len(found.reasons)]
+    chosen = _possible(lambda n: planner.chosen(n)[1], sizes)
     views = max(map(len, settings_of(planner.own).values()))
-    uniform = [planner.uniform(n) for n in _sizes(2, max(views, 2))]
+    uniform = _possible(planner.uniform, _sizes(2, max(views, 2)))
     return Curves(
         found=found,
         chosen=_by_time([*chosen, found.chosen]),
         uniform=_by_time(uniform),
     )
+
+
+def _possible(plan: Callable[[int], Planned], sizes: list[int]) -> list[Planned]:
+    """Return the plans of these sizes; a keep-out zone may bar some, of which there is no point."""
+    found = []
+    for size in sizes:
+        with suppress(InputError):
+            found.append(plan(size))
+    return found
 
 
 def _by_time(plans: list[Planned]) -> tuple[Planned, ...]:

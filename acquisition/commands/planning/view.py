@@ -67,7 +67,10 @@ def _notes(found: OptimalPlan) -> Iterator[str]:
             "for others, or the way to those between its views is not clear"
         )
     if found.same_time is None:
-        yield "even sweeps of two views at each setting of the lamp already take more time"
+        yield (
+            "no even sweeps of this time: two views at each setting of the lamp take more, or a "
+            "keep-out zone bars the way"
+        )
     together = " together" if len(found.asked) > 1 else ""
     yield (
         f"no other {len(found.reasons)} of the candidates, repeated or not, can have less than "
@@ -76,8 +79,8 @@ def _notes(found: OptimalPlan) -> Iterator[str]:
     told = {name: chi2 for name, chi2 in found.rivals.items() if chi2 >= TOLD_APART}
     if told:
         yield (
-            f"told apart from {', '.join(told)}: their best fits will miss the values by a chi2 of "
-            f"{min(told.values()):.3g} or more"
+            f"told apart from {', '.join(told)}: the best fit of each will miss the values by a "
+            f"chi2 of {min(told.values()):.3g} or more"
         )
     for name in found.rivals.keys() - told.keys():
         yield (

@@ -86,7 +86,9 @@ def test_the_parameters_asked_for(small: Loaded) -> None:
     assert asked_parameters("ks, sigma_deg,ks", sample, small) == ["ks", "sigma_deg"]
     bare = changed(small, references=References())
     assert asked_parameters(None, sample, bare) == ["sigma_deg"]
-    assert forecast(bare, make_plan(bare), sample).u()["sigma_deg"] > _u(small)["sigma_deg"]
+    relative = forecast(bare, make_plan(bare), sample).u()
+    assert set(relative) == {"sigma_deg"}
+    assert relative["sigma_deg"] > _u(small)["sigma_deg"]
 
 
 @pytest.mark.parametrize(

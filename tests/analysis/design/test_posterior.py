@@ -16,7 +16,7 @@ def test_points_added_and_removed_leave_what_a_new_computation_finds(seed: int) 
     weights = known.weights(["albedo", "ks"])
     chosen = np.zeros(20, dtype=bool)
     chosen[:6] = True
-    now = Posterior.of(known, weights, chosen)
+    now = Posterior(known, weights, chosen)
     for point in rng.permutation(20)[:12]:
         expected = chosen.copy()
         expected[point] = not chosen[point]
@@ -29,6 +29,6 @@ def test_points_added_and_removed_leave_what_a_new_computation_finds(seed: int) 
             now.add(int(point))
             assert added == pytest.approx(now.criterion, rel=1e-6)
         chosen = expected
-        new = Posterior.of(known, weights, chosen)
+        new = Posterior(known, weights, chosen)
         assert now.criterion == pytest.approx(new.criterion, rel=1e-5)
         assert now.cross == pytest.approx(new.cross, rel=1e-4, abs=1e-5)
