@@ -4,15 +4,18 @@ Only pixel noise, flicker of the lamp and the camera's black level make frames o
 With frame means m_k of variance v the sum of (m_k - mean)^2 / v has a chi-squared distribution of
 n - 1 degrees of freedom; v is the larger of the rig file's photon transfer and the variance that
 the pixels show (the true gain may differ from the full well of the rig file). What exceeds it
-raises the reading's noise, up to what the rig file states for flicker and black level; what exceeds
-that too is flagged, and ends the scan where reading after reading has it.
+raises the noise of this and of later readings, up to what the rig file states for flicker and black
+level; what exceeds that too is flagged, and ends the scan where reading after reading has it.
+
+All readings of a scan so far tell the flicker. A few tell it badly: two frames agree by chance, the
+reading then counts for more than it is worth, and a fit follows it.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -30,7 +33,7 @@ FLAG = "frames differ"
 # Limit of chi-squared, as a deviation of a normal distribution: a scatter that is surely too large
 # is seen in none of 50 million sound readings. SEEN_SIGMA is the one that raises u.
 _SURE_SIGMA = 5.5
-_LOW_TAIL = 0.05  # probability that so small a scatter is seen by chance
+_LOW_TAIL = 0.16  # probability that so small a scatter is seen by chance: one standard deviation
 _RECENT = 8  # readings
 # Variance of a pixel relative to the rig file's: 16 of read noise where the true full well is a
 # quarter. More is no noise, but a frame that differs.
@@ -68,6 +71,52 @@ class Scatter:
     def ratio(self) -> float:
         """Sum of squares relative to the variance that noise and rig file allow: chi-squared."""
         return self.squares / (self.pixel_variance + self.allowed_variance)
+
+    def explained(self, share: float) -> Scatter:
+        """Return a copy in which a share, 0 to 1, of what is allowed counts as pixel noise."""
+        variance = self.pixel_variance + share * self.allowed_variance
+        return replace(self, pixel_variance=variance)
+
+
+@dataclass(slots=True)
+class _Sums:
+    """Sums over readings, in DN^2 where they are no numbers; variances by degrees of freedom."""
+
+    freedom: int = 0
+    noise_ratio: float = 0.0
+    squares: float = 0.0
+    pixel_variance: float = 0.0
+    allowed_variance: float = 0.0
+
+    @classmethod
+    def of(cls, readings: Iterable[Scatter]) -> _Sums:
+        """Return the sums over these readings."""
+        sums = cls()
+        for one in readings:
+            sums.add(one)
+        return sums
+
+    def add(self, one: Scatter) -> None:
+        """Count one more reading."""
+        self.freedom += one.freedom
+        self.noise_ratio += one.noise_ratio
+        self.squares += one.squares
+        self.pixel_variance += one.freedom * one.pixel_variance
+        self.allowed_variance += one.freedom * one.allowed_variance
+
+    @property
+    def share(self) -> float:
+        """84 % bound of what is seen beyond pixel noise, as a share, 0 to 1, of what is allowed.
+
+        A bound, as two frames alone may agree by chance; the more readings, the closer it is.
+        """
+        if self.noise_ratio <= chi_squared_limit(self.freedom, SEEN_SIGMA):
+            return 0.0
+        from scipy.special import chdtri  # heavy: no quiet scan needs it
+
+        bound = self.squares * self.freedom / float(chdtri(self.freedom, 1 - _LOW_TAIL))
+        excess = max(bound - self.pixel_variance, 0.0)
+        return 1.0 if excess >= self.allowed_variance else excess / self.allowed_variance
 
 
 def frame_scatter(
@@ -112,6 +161,9 @@ class FrameScatter:
     rig: Rig
     note: Callable[[str], None]
     _recent: deque[Scatter] = field(default_factory=lambda: deque(maxlen=_RECENT))
+    # All readings that were not flagged; the worst of them stands by itself.
+    _so_far: _Sums = field(default_factory=_Sums)
+    _worst: Scatter | None = None
 
     def judged(
         self, signal: Signal, frames: Sequence[Frame], dark: Dark, window: Window, name: str
@@ -124,7 +176,7 @@ class FrameScatter:
             return signal
         found = frame_scatter(frames, signal, dark, window, self.rig)
         if found.freedom:
-            self._recent.append(found)
+            self._remember(found)
         excess = self._excess_variance(found) / len(frames)
         if excess > 0:
             signal = replace(signal, u_noise_dn=math.hypot(signal.u_noise_dn, math.sqrt(excess)))
@@ -140,26 +192,30 @@ class FrameScatter:
         order = sorted(self._recent, key=lambda one: one.ratio / one.freedom)
         return order[:-1] or order
 
+    def _remember(self, found: Scatter) -> None:
+        """Count a reading of several frames, among all of the scan if it is not to be flagged."""
+        self._recent.append(found)
+        if found.ratio > chi_squared_limit(found.freedom, _SURE_SIGMA):
+            return
+        worst = self._worst
+        if worst is None or found.ratio / found.freedom > worst.ratio / worst.freedom:
+            self._worst, found = found, worst or found
+        if worst is not None:
+            self._so_far.add(found)
+
     def _excess_variance(self, found: Scatter) -> float:
         """Return the variance of one frame's mean beyond pixel noise, 0 if none is seen.
 
-        The last readings give its 95 % bound, as two frames alone may agree by chance; it counts up
-        to what the rig file allows.
+        The readings of the scan so far tell it, without the worst. The last ones count beside them
+        if they scatter surely more, and the reading itself if it does.
         """
-        last = self._without_worst()
-        if not last:
-            return 0.0
-        freedom = sum(one.freedom for one in last)
-        own = found.noise_ratio > chi_squared_limit(found.freedom, SEEN_SIGMA)
-        all_of_them = sum(one.noise_ratio for one in last) > chi_squared_limit(freedom, SEEN_SIGMA)
-        if not (own or all_of_them):
-            return 0.0
-        from scipy.special import chdtri  # heavy: no quiet scan needs it
-
-        measured = found.squares / found.freedom - found.pixel_variance if own else 0.0
-        shares = sum(one.squares / max(one.allowed_variance, 1e-12) for one in last)
-        bound = min(shares / float(chdtri(freedom, 1 - _LOW_TAIL)), 1.0) * found.allowed_variance
-        return max(measured, bound)
+        known = self._so_far.share
+        known += _Sums.of(one.explained(known) for one in self._without_worst()).share
+        variance = min(known, 1.0) * found.allowed_variance
+        rest = found.explained(min(known, 1.0))
+        if rest.noise_ratio > chi_squared_limit(found.freedom, SEEN_SIGMA):
+            return max(found.squares / found.freedom - found.pixel_variance, variance)
+        return variance
 
     def _require_steady(self, signal: Signal, name: str) -> None:
         """Raise `Interlock` if the last readings scatter too much, the worst left out."""

@@ -125,6 +125,20 @@ def test_flicker_that_the_rig_file_allows_is_in_u(count: int) -> None:
     assert beyond <= {2: 0.06, 4: 0.02, 16: 0.01}[count]  # two frames may agree by chance
 
 
+@pytest.mark.parametrize("flicker", [0.0008, 0.0015, 0.003])
+def test_flicker_that_was_seen_is_in_the_u_of_every_later_reading(flicker: float) -> None:
+    """Also of readings whose two frames agree: too small a u would draw a fit to them."""
+    for seed in range(6):
+        bench, ratios = Bench(12, (60, 70), seed=100 + seed), []
+        for _ in range(60):
+            levels = 0.6 * (1 + bench.random.normal(0.0, flicker, 2))
+            signal, judged = bench.signals(bench.frames(levels))
+            true_u = np.hypot(signal.u_noise_dn, flicker * signal.signal_dn / np.sqrt(2))
+            ratios.append(judged.u_noise_dn / true_u)
+        assert min(ratios[20:]) > 0.65
+        assert 0.85 < np.median(ratios[20:]) < 1.4
+
+
 def test_a_single_frame_has_nothing_to_compare() -> None:
     bench = Bench(12, (60, 70))
     signal, judged = bench.signals(bench.frames([0.7]))
