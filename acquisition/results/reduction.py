@@ -10,7 +10,7 @@ memory.
 from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -57,7 +57,7 @@ class Reduced:
     flags: empty for a good point.
     drift_levels: lamp level relative to the first check, at each usable check, one array a block.
     drift_checks: number of drift checks that were made. drift_scatter: of their levels about a
-        steady drift, in units of their noise.
+        steady drift, in units of their noise. drifts: by block.
     """
 
     points: tuple[Reading, ...]
@@ -70,6 +70,7 @@ class Reduced:
     drift_levels: tuple[FloatArray, ...]
     drift_checks: int
     drift_scatter: float = 1.0
+    drifts: Mapping[int, Drift] = field(default_factory=dict)
 
     @property
     def parts(self) -> dict[str, FloatArray]:
@@ -241,6 +242,7 @@ def reduce(
         drift_levels=tuple(drift.level for drift in drifts.values()),
         drift_checks=sum(r.kind == "drift" for r in readings) + sum(c.jumped for c in checks),
         drift_scatter=max((drift.scatter for drift in drifts.values()), default=1.0),
+        drifts=drifts,
     )
 
 

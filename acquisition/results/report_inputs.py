@@ -6,6 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from acquisition.results.facts.input_files import calibration_rows, file_rows
+from acquisition.results.facts.lamp_levels import lamp_levels
 from acquisition.results.fitting import Fitted
 from acquisition.results.reduction import Reduced
 from acquisition.results.summary import budget, parameters_of, sources_of
@@ -57,9 +59,12 @@ def report_data(
         candidates=candidates(fitted),
         budget=budget(parts),
         sources=sources_of(parts),
+        lamp=lamp_levels(reduced.drifts, record.readings()),
         previews=tuple(record.previews()),
         rig=(*_rig_rows(loaded.rig), *_tile_rows(protocol.references.white_tile)),
         devices=tuple(record.devices().items()),
+        calibrations=calibration_rows(loaded.rig),
+        files=file_rows(record),
         metadata=_metadata_rows(protocol.metadata),
         versions=_version_rows(record),
         times=_time_rows(record),

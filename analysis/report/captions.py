@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from analysis.report.data import ReportData
+from analysis.report.data import LampLevels, ReportData
 from analysis.report.figures import charts
 from analysis.report.figures.hemisphere import HemisphereMap
 from analysis.report.style import escaped
@@ -167,4 +167,15 @@ def budget_caption(sweeps: Sweeps) -> str:
     return (
         f"The top is the standard uncertainty of a point at that {sweeps[0].axis.name}; each band "
         "is as high as its share of the variance. Sources of one kind are combined."
+    )
+
+
+def drift_caption(lamps: Sequence[LampLevels]) -> str:
+    """Caption of the chart of the lamp's level."""
+    jumps = sum(len(set(one.stretch.tolist())) - 1 for one in lamps)
+    jumped = "1 jump of" if jumps == 1 else f"{jumps} jumps of"
+    return (
+        "Each point is a repeated reading of one geometry, relative to the first; bars: u (k = 1) "
+        "from noise. The readings between two checks are corrected along the lines."
+        + (f" {jumped} the lamp while the scan was interrupted: no line there." if jumps else "")
     )

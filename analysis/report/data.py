@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from instrument.geometry import BoolArray, FloatArray
+from instrument.geometry import BoolArray, FloatArray, IntArray
 from instrument.record.reading import Preview
 
 Rows = tuple[tuple[str, str], ...]
@@ -69,6 +69,22 @@ class Candidate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LampLevels:
+    """Level of the lamp at the drift checks (C,) made with one setting by hand, with its u.
+
+    Both are relative to the first check. theta_i_deg, theta_r_deg: of the checks, in degrees.
+    time_s: since the first reading. stretch: number of the steady stretch between two jumps.
+    """
+
+    theta_i_deg: float
+    theta_r_deg: float
+    time_s: FloatArray
+    level: FloatArray
+    u: FloatArray
+    stretch: IntArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ReportData:
     """Content of a report. Arrays and `flags` have one entry per point (N,).
 
@@ -81,6 +97,7 @@ class ReportData:
         identifiable`, or empty where nothing was fitted; sets the colour of the box.
     budget: rows of (component, median relative u in %, share of the variance in %).
     sources: relative standard uncertainties (N,) by source, those of one kind combined.
+    lamp: levels at the drift checks. calibrations, files: what they found, and hashes.
     """
 
     title: str
@@ -102,9 +119,12 @@ class ReportData:
     budget: tuple[tuple[str, float, float], ...] = ()
     sources: Mapping[str, FloatArray] = field(default_factory=dict)
     relative_brdf: bool = False
+    lamp: tuple[LampLevels, ...] = ()
     previews: tuple[Preview, ...] = ()
     rig: Rows = ()
     devices: Rows = ()
+    calibrations: Rows = ()
+    files: Rows = ()
     metadata: Rows = ()
     versions: Rows = ()
     times: Rows = ()

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from analysis.report.data import ReportData
-from analysis.report.figure_list import budget_figure, chart_figures
+from analysis.report.figure_list import budget_figure, chart_figures, drift_figure
 from analysis.report.style import svg_file
 from analysis.report.sweeps import PlottedSweep, group_sweeps
 
@@ -21,17 +21,19 @@ def figure_files(data: ReportData) -> dict[str, str]:
     """Return the content of each file by its name.
 
     An SVG for each chart; `points.csv`: what was measured, with deviations from the model;
-    `lines.csv`: lines of the models; `budget.csv`: relative u of each point by source. Empty
-    without a value to plot.
+    `lines.csv`: lines of the models; `budget.csv`: relative u of each point by source;
+    `drift.csv`: level of the lamp at each drift check. Empty without a value to plot.
     """
     sweeps = group_sweeps(data)
-    figures = [*chart_figures(data, sweeps), budget_figure(data, sweeps)]
+    figures = [*chart_figures(data, sweeps), budget_figure(data, sweeps), drift_figure(data)]
     files = {}
     for figure in (one for one in figures if one is not None):
         drawings = figure.drawings(False)
         for n, drawing in enumerate(drawings, start=1):
             number = f"-{n}" if len(drawings) > 1 else ""
             files[f"{figure.name}{number}.svg"] = svg_file(drawing)
+    if data.lamp:
+        files["drift.csv"] = _drift_csv(data)
     if not sweeps:
         return files
     files["points.csv"] = _points_csv(data, sweeps)
@@ -84,6 +86,16 @@ def _budget_csv(data: ReportData) -> str:
         for i in range(len(data.flags))
     )
     return _csv((*_ANGLES, *(f"u of {name} (%)" for name in data.sources)), rows)
+
+
+def _drift_csv(data: ReportData) -> str:
+    """Level of the lamp at each drift check, relative to the first of its setting by hand."""
+    rows = (
+        tuple(map(_number, (one.theta_i_deg, one.theta_r_deg, *map(float, check))))
+        for one in data.lamp
+        for check in zip(one.time_s, one.level, one.u, strict=True)
+    )
+    return _csv(("theta_i_deg", "theta_r_deg", "time_s", "level", "u_level"), rows)
 
 
 def _angles(data: ReportData, i: int) -> tuple[str, ...]:

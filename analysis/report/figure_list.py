@@ -10,6 +10,7 @@ from analysis.report import captions
 from analysis.report.data import ReportData
 from analysis.report.figures import charts
 from analysis.report.figures.budget_chart import budget_drawing, with_budget
+from analysis.report.figures.drift_chart import drift_drawing
 from analysis.report.figures.hemisphere import hemisphere_drawing, hemisphere_maps
 from analysis.report.figures.polar import polar_drawing
 from analysis.report.style import Drawing, embedded_svg, escaped, figure_html
@@ -96,6 +97,19 @@ def budget_figure(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> ReportF
         label="uncertainty by source",
         caption=captions.budget_caption(known),
         drawings=_one(partial(budget_drawing, data, known)),
+    )
+
+
+def drift_figure(data: ReportData) -> ReportFigure | None:
+    """Return the figure of the lamp's level, None where it was not checked."""
+    if not data.lamp:
+        return None
+    return ReportFigure(
+        name="drift",
+        heading="Drift of the lamp",
+        label="level of the lamp against time",
+        caption=captions.drift_caption(data.lamp),
+        drawings=_one(partial(drift_drawing, data.lamp)),
     )
 
 

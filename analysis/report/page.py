@@ -10,7 +10,7 @@ from pathlib import Path
 
 from analysis.report import captions
 from analysis.report.data import ReportData, Rows
-from analysis.report.figure_list import budget_figure, chart_figures
+from analysis.report.figure_list import budget_figure, chart_figures, drift_figure
 from analysis.report.point_texts import points_html
 from analysis.report.sections.models_html import candidates_html, verdict_html
 from analysis.report.sections.pictures_html import pictures_html
@@ -48,6 +48,7 @@ def report_html(data: ReportData) -> str:
         candidates_html(data),
         _flagged(data),
         _budget(data, sweeps),
+        _drift(data),
         pictures_html(data.previews),
         _facts(data),
         points_html(data, sweeps) if sweeps else "",
@@ -118,6 +119,11 @@ def _budget(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
     )
 
 
+def _drift(data: ReportData) -> str:
+    figure = drift_figure(data)
+    return f'<h2 id="{figure.name}">{figure.heading}</h2>\n{figure.html()}' if figure else ""
+
+
 def _percent(value: float) -> str:
     return "< 0.0001 %" if 0 < value < 1e-4 else f"{_number(value, '.2g')} %"
 
@@ -136,6 +142,8 @@ def _facts(data: ReportData) -> str:
         ("metadata", "Sample and light", data.metadata),
         ("rig", "Rig", data.rig),
         ("devices", "Devices", data.devices),
+        ("calibrations", "Calibrations", data.calibrations),
+        ("files", "Files", data.files),
         ("times", "Times", data.times),
         ("versions", "Versions", data.versions),
     )
