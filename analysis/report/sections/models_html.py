@@ -100,7 +100,7 @@ def _why_not(candidate: Candidate, chosen: Candidate | None) -> str:
     if not candidate.converged:
         return f"did not converge: {candidate.message}"
     if not candidate.agrees:
-        return "does not fit: residuals larger than u, or with a pattern"
+        return f"does not fit: {_misfit(candidate.reduced_chi2)}"
     if candidate.chosen or chosen is None:
         return ""
     chi2 = candidate.reduced_chi2
@@ -110,6 +110,16 @@ def _why_not(candidate: Candidate, chosen: Candidate | None) -> str:
     if more > 0:
         return f"fits, but has {more} parameter{'s' * (more > 1)} more than needed"
     return "fits, but less well with as many parameters" if more == 0 else "fits less well"
+
+
+def _misfit(chi2: float | None) -> str:
+    """Return what is wrong with the residuals of a model that does not agree."""
+    if chi2 is None or not math.isfinite(chi2):
+        return "residuals too large"
+    if chi2 > _WITHIN_U:
+        return f"residuals about {float(f'{math.sqrt(chi2):.2g}'):g} times u"
+    # Chi2 alone is rejected above 1 only; below, the runs test has rejected.
+    return "residuals with a pattern" if chi2 <= 1 else "residuals larger than u, or with a pattern"
 
 
 def _free(candidate: Candidate) -> int:
