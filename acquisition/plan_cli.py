@@ -18,6 +18,12 @@ def plan(
         int | None,
         typer.Option(min=1, help="Choose so many geometries that determine the parameters best."),
     ] = None,
+    until: Annotated[
+        str | None,
+        typer.Option(
+            help="Choose the fewest that reach these u, as sigma_deg=0.2,albedo=0.005.",
+        ),
+    ] = None,
     wanted: Annotated[
         str | None,
         typer.Option(
@@ -43,19 +49,26 @@ def plan(
 ) -> None:
     """Show the geometries and the duration of a scan; opens no device.
 
-    With --optimal: a few geometries among those of the protocol's sweeps, what each is for, and
-    the u that they will give, beside the sweeps.
+    With --optimal or --until: a few geometries among those of the protocol's sweeps, what each is
+    for, and the u that they will give, beside the sweeps.
     """
-    if optimal is None:
+    if until is not None and (optimal is not None or wanted is not None):
+        other = "--optimal" if optimal is not None else "--for"
+        raise InputError(f"gonio plan: {other}: not allowed with --until, which says how many")
+    if optimal is None and until is None:
         options = {"--for": wanted, "--like": like, "--out": out, "--chart": chart}
         given = [name for name, value in options.items() if value is not None]
         if given:
-            raise InputError(f"gonio plan: {', '.join(given)}: allowed with --optimal N only")
+            raise InputError(
+                f"gonio plan: {', '.join(given)}: allowed with --optimal N or --until only"
+            )
         from acquisition.commands.scan import show_plan
 
         show_plan(protocol, rig, as_json=json)
         return
     from acquisition.commands.planning.optimal import OptimalOptions, show_optimal_plan
 
-    chosen = OptimalOptions(count=optimal, wanted=wanted, like=like, out=out, chart=chart)
+    chosen = OptimalOptions(
+        count=optimal, until=until, wanted=wanted, like=like, out=out, chart=chart
+    )
     show_optimal_plan(protocol, rig, chosen, as_json=json)

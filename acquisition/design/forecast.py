@@ -15,6 +15,7 @@ from acquisition.design.predicted_readings import PredictedReadings
 from acquisition.plan.plan import Plan
 from acquisition.results.fitting import measurements
 from acquisition.results.reduction import reduced_rows
+from analysis.data.covariance import ANGLES, LAMP_LEVEL
 from analysis.data.measurements import Measurements
 from analysis.design.information import Information, assumed_problem
 from analysis.fit.relative_scale import unscaled_parameters
@@ -23,6 +24,12 @@ from instrument.config.load import Loaded
 from instrument.errors import InputError
 from instrument.geometry import BoolArray, FloatArray, Geometry
 from instrument.record.reading import Rows
+
+INDEPENDENT = "noise"
+"""Source of what no two points share: noise, rounding, texture."""
+
+UNDETERMINED = 0.25
+"""Part of a parameter's domain; a u beyond it says nothing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +59,18 @@ class Forecast:
         lost = unscaled_parameters(self.problem.model) if m.relative else frozenset[str]()
         found = self.information.u(np.ones(m.size))
         return {name: u for name, u in found.items() if name not in lost}
+
+    def sources(self, parameter: str) -> dict[str, float]:
+        """Parts of a parameter's variance by the source of error, of a sum of 1, largest first."""
+        m, information = self.measurements, self.information
+        independent, shared = information.parts(np.ones(m.size), parameter)
+        found = {INDEPENDENT: independent}
+        named = sorted({error.name for error in m.shared}, key=len, reverse=True)
+        for numbered, part in zip(information.errors, shared.tolist(), strict=True):
+            source = next((name for name in named if numbered.startswith(name)), None)
+            source = source or (LAMP_LEVEL if numbered.startswith(LAMP_LEVEL) else ANGLES)
+            found[source] = found.get(source, 0.0) + part
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
 def forecast(loaded: Loaded, plan: Plan, sample: AssumedSample) -> Forecast:
@@ -83,8 +102,10 @@ def _without_patch(loaded: Loaded) -> Loaded:
     return replace(loaded, rig=loaded.rig.model_copy(update={"camera": camera}))
 
 
-def asked_parameters(text: str | None, sample: AssumedSample, loaded: Loaded) -> list[str]:
-    """Return the parameters named in a text, separated by commas; without one, all that can be.
+def asked_parameters(
+    text: str | None, sample: AssumedSample, loaded: Loaded, option: str = "--for"
+) -> list[str]:
+    """Return the parameters named in an option, separated by commas; without it, all that can be.
 
     Raises `InputError` for one that the model does not have, or that a scan without a white tile
     does not determine.
@@ -104,12 +125,13 @@ def asked_parameters(text: str | None, sample: AssumedSample, loaded: Loaded) ->
     for name in asked:
         if name in lost:
             raise InputError(
-                f"--for {name}: not determined without a white tile; allowed: {', '.join(allowed)}"
+                f"{option} {name}: not determined without a white tile; allowed: "
+                f"{', '.join(allowed)}"
             )
     wrong = [name for name in asked if name not in names]
     if wrong or not asked:
         what = ", ".join(wrong) or "nothing"
         raise InputError(
-            f"--for: {sample.model.name} has no parameter {what}; allowed: {', '.join(allowed)}"
+            f"{option}: {sample.model.name} has no parameter {what}; allowed: {', '.join(allowed)}"
         )
     return asked

@@ -6,7 +6,7 @@ Candidates are the geometries of the protocol and those halfway between its view
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,7 @@ from acquisition.design.geometries import (
     settings_of,
     uniform,
 )
+from acquisition.design.goal import Goal
 from acquisition.plan.plan import Plan, make_plan
 from acquisition.plan.pose import Pose
 from analysis.choice.ladder import CANDIDATES, with_method
@@ -55,7 +56,9 @@ class OptimalPlan:
     efficiency: least root of the summed variances that any choice of as many points, repetitions
     included, can have, over that of the chosen ones: at most 1. rivals: models that the plan tells
     apart, with the chi2 by which the best fit of each will miss the values. between: candidates
-    between the protocol's own geometries, of all `candidates`.
+    between the protocol's own geometries, of all `candidates`. sources: parts of the variance of
+    each parameter asked for by the source of error, of a sum of 1, largest first. goal: wanted u,
+    None where a number of geometries was asked for.
     """
 
     sample: AssumedSample
@@ -68,13 +71,16 @@ class OptimalPlan:
     rivals: dict[str, float]
     candidates: int
     between: int
+    sources: dict[str, dict[str, float]]
+    goal: Goal | None
 
 
 @dataclass(frozen=True, slots=True)
 class Planner:
     """Candidates of a protocol for a sample, from which plans of any size are chosen.
 
-    points: poses of the candidates that can be used, in the order of `listed`.
+    points: poses of the candidates that can be used, in the order of `listed`. goal: u wanted of
+    the parameters asked for, which else count alike.
     """
 
     loaded: Loaded
@@ -85,19 +91,27 @@ class Planner:
     every: Forecast
     listed: Candidates
     rivals: tuple[Rival, ...]
+    goal: Goal | None = None
 
     @classmethod
-    def of(cls, loaded: Loaded, sample: AssumedSample, asked: Sequence[str], count: int) -> Planner:
+    def of(
+        cls,
+        loaded: Loaded,
+        sample: AssumedSample,
+        asked: Sequence[str],
+        count: int | None = None,
+        goal: Goal | None = None,
+    ) -> Planner:
         """Forecast all candidates, and fit the models that could pass for the sample.
 
-        Raises `InputError` if `count` of them cannot be chosen.
+        Raises `InputError` if `count` of them, or as many as parameters, cannot be chosen.
         """
         own = make_plan(loaded)
         finer, plan = candidate_plan(loaded, own)
         every = forecast(finer, plan, sample)
         kept = zip(plan.points, every.used, strict=True)
         points = tuple(step.pose for step, used in kept if used)
-        _require(count, len(every.x), len(points))
+        _require(len(every.x) if count is None else count, len(every.x), len(points))
         listed = Candidates(
             geometry=every.measurements.geometry,
             information=every.information,
@@ -105,14 +119,16 @@ class Planner:
         )
         names = loaded.protocol.fit.models or with_method(CANDIDATES, "functional")
         rivals = leading(every.problem, every.measurements, names)
-        return cls(loaded, sample, tuple(asked), own, points, every, listed, rivals)
+        return cls(loaded, sample, tuple(asked), own, points, every, listed, rivals, goal)
 
     def chosen(self, count: int, seed: int = 0) -> tuple[tuple[Pick, ...], Planned]:
         """Choose `count` candidates and plan them.
 
         Raises `InputError` where a keep-out zone bars the way from one to the next.
         """
-        picks = choose(self.listed, self.asked, count, rivals=self.rivals, seed=seed)
+        picks = choose(
+            self.listed, self.asked, count, rivals=self.rivals, goal=self._wanted, seed=seed
+        )
         poses = [self.points[pick.candidate] for pick in picks]
         order = list(settings_of(self.own))
         groups = grouped(poses)
@@ -121,7 +137,7 @@ class Planner:
             return picks, self._planned(*quicker(self.loaded, ordered))
         except InputError as error:
             raise InputError(
-                f"--optimal {count}: {'; '.join(error.problems)}. The chosen geometries leave out "
+                f"{count} geometries: {'; '.join(error.problems)}. The chosen geometries leave out "
                 "those on the protocol's way around the zone: choose another number, or leave the "
                 "views beside the zone out of the protocol"
             ) from None
@@ -180,12 +196,23 @@ class Planner:
             efficiency=self._efficiency(design.astype(np.float64)),
             rivals={rival.name: rival.missed(design) for rival in self.rivals},
             candidates=len(self.points),
+            sources=self.sources(chosen),
+            goal=self.goal,
             between=sum(pose.theta_r not in own[pose.theta_i, pose.dphi] for pose in self.points),
         )
 
+    def sources(self, planned: Planned) -> dict[str, dict[str, float]]:
+        """Parts of the variance of each parameter asked for, by the source of error."""
+        found = forecast(planned.loaded, planned.plan, self.sample)
+        return {name: found.sources(name) for name in self.asked}
+
+    @property
+    def _wanted(self) -> Mapping[str, float] | None:
+        return None if self.goal is None else self.goal.u
+
     def _efficiency(self, counts: np.ndarray) -> float:
         information = self.listed.information
-        weights = information.weights(self.asked)
+        weights = information.weights(self.asked, self._wanted)
         own = float(weights @ np.diag(information.covariance(counts)))
         bound = best_weights(information, weights, float(counts.sum())).bound
         return float(np.sqrt(bound / own))

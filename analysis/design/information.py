@@ -9,7 +9,7 @@ new, so that u has a floor which no repetition passes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,12 +31,13 @@ class Information:
 
     names: the parameters. domain: (K,), width of the domain of each, in its unit. rows: (N, K + S),
     change of each value by a whole domain of each parameter and by one u of each shared error, in
-    units of the independent u of that value.
+    units of the independent u of that value. errors: (S,), names of the shared errors.
     """
 
     names: tuple[str, ...]
     domain: FloatArray
     rows: FloatArray
+    errors: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, problem: Problem, x: FloatArray) -> Information:
@@ -53,7 +54,7 @@ class Information:
         common = covariance.common
         shared = common if isinstance(common, np.ndarray) else common.toarray()
         rows = np.hstack([J, shared]) / covariance.u_independent[:, np.newaxis]
-        return cls(names=tuple(values), domain=domain, rows=rows)
+        return cls(names=tuple(values), domain=domain, rows=rows, errors=covariance.names)
 
     @property
     def prior(self) -> FloatArray:
@@ -96,16 +97,28 @@ class Information:
         own = np.diag(self.covariance(counts))[: len(self.names)]
         return dict(zip(self.names, (np.sqrt(own) * self.domain).tolist(), strict=True))
 
-    def weights(self, asked: Iterable[str]) -> FloatArray:
+    def parts(self, counts: FloatArray, parameter: str) -> tuple[float, FloatArray]:
+        """Parts of a parameter's variance, of a sum of 1, by a design of `counts` (N,).
+
+        That of independent errors, and those (S,) of each shared error: what one u of it shifts the
+        best estimate by, squared.
+        """
+        covariance, k = self.covariance(counts), self.names.index(parameter)
+        shared = np.square(covariance[k, len(self.names) :]) / covariance[k, k]
+        return float(1 - shared.sum()), shared
+
+    def weights(self, asked: Iterable[str], goal: Mapping[str, float] | None = None) -> FloatArray:
         """Weights (unknowns,) on the variances of the asked parameters, for one sum of all.
 
         Each counts in units of the variance that all candidates together would leave: 1 for each
-        is the most that can be reached by measuring every candidate once.
+        is the most that can be reached by measuring every candidate once. With a `goal`, the u
+        wanted of each, in its unit, each counts in units of the variance wanted.
         """
         own = np.diag(self.covariance(np.ones(len(self.rows))))
         found = np.zeros(self.rows.shape[1])
         for name in asked:
-            found[self.names.index(name)] = 1 / own[self.names.index(name)]
+            k = self.names.index(name)
+            found[k] = 1 / own[k] if goal is None else (self.domain[k] / goal[name]) ** 2
         return found
 
 

@@ -10,8 +10,8 @@ do not.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -85,18 +85,20 @@ def choose(
     count: int,
     *,
     rivals: Sequence[Rival] = (),
+    goal: Mapping[str, float] | None = None,
     share: float = SHARE,
     seed: int = 0,
 ) -> tuple[Pick, ...]:
     """Choose `count` different candidates for the parameters `asked`, in the list's order.
 
-    rivals: other models, with problems of the same candidates. share: of the points, for lack of
+    rivals: other models, with problems of the same candidates. goal: u wanted of each parameter
+    asked for, in its unit; without it they count alike. share: of the points, for lack of
     fit. seed: of the random starts. Raises `ValueError` for a count beyond the candidates, or a
     parameter that the model does not have.
     """
     _require(candidates, asked, count)
     order = _canonical(candidates.geometry)
-    listed = _List.of(candidates, asked, order)
+    listed = _List.of(candidates, asked, order, goal)
     spread = math.ceil(share * count)
     apart = math.floor(share * count) if rivals else 0
     fixed = listed.spread(spread)
@@ -141,10 +143,16 @@ class _List:
     asked: tuple[str, ...]
 
     @classmethod
-    def of(cls, candidates: Candidates, asked: Sequence[str], order: IntArray) -> _List:
+    def of(
+        cls,
+        candidates: Candidates,
+        asked: Sequence[str],
+        order: IntArray,
+        goal: Mapping[str, float] | None,
+    ) -> _List:
         whole, g = candidates.information, candidates.geometry
-        information = Information(names=whole.names, domain=whole.domain, rows=whole.rows[order])
-        weights = information.weights(asked)
+        information = replace(whole, rows=whole.rows[order])
+        weights = information.weights(asked, goal)
         return cls(
             geometry=Geometry(g.theta_i_deg[order], g.theta_r_deg[order], g.dphi_deg[order]),
             information=information,

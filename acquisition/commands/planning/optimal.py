@@ -1,4 +1,4 @@
-"""Command `gonio plan --optimal N`: the geometries that determine the parameters best."""
+"""Commands `gonio plan --optimal N` and `--until GOAL`: the geometries that teach most."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from pathlib import Path
 from acquisition.commands.planning.chart import FORMATS, Curves, chart
 from acquisition.commands.planning.view import optimal_json, print_optimal
 from acquisition.design.assumed_sample import assumed_sample
+from acquisition.design.fewest import fewest
 from acquisition.design.forecast import asked_parameters
 from acquisition.design.geometries import settings_of
+from acquisition.design.goal import goal_of
 from acquisition.design.optimal_plan import OptimalPlan, Planned, Planner
 from acquisition.design.protocol_file import protocol_text
 from acquisition.results.model_check import check_model
@@ -30,10 +32,11 @@ _CURVE = 8  # plans of a curve in the chart
 class OptimalOptions:
     """Options of `gonio plan --optimal`: how many geometries, for which parameters and sample.
 
-    out: protocol to write; chart: picture to write.
+    until: goal in place of a count. out: protocol to write; chart: picture to write.
     """
 
-    count: int
+    count: int | None = None
+    until: str | None = None
     wanted: str | None = None
     like: str | None = None
     out: Path | None = None
@@ -50,10 +53,11 @@ def show_optimal_plan(
     _check_files(options)
     loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
     sample = assumed_sample(options.like, loaded)
-    asked = asked_parameters(options.wanted, sample, loaded)
+    goal = None if options.until is None else goal_of(options.until, sample, loaded)
+    asked = asked_parameters(options.wanted, sample, loaded) if goal is None else list(goal.u)
     with sign_of_life("choosing geometries"):
-        planner = Planner.of(loaded, sample, asked, options.count)
-        found = planner.optimal(options.count)
+        planner = Planner.of(loaded, sample, asked, options.count, goal)
+        found = _found(planner, options.count)
         files = dict(_files(planner, found, options))
     for path, (content, new) in files.items():
         write_whole(path, content, new=new)
@@ -63,6 +67,15 @@ def show_optimal_plan(
         print_optimal(found)
     for path in files:
         console.print(f"written: {path}", highlight=False, soft_wrap=True)
+
+
+def _found(planner: Planner, count: int | None) -> OptimalPlan:
+    """Return the plan of so many geometries, or of the fewest that reach the planner's goal."""
+    if count is not None:
+        return planner.optimal(count)
+    if planner.goal is None:
+        raise ValueError("neither a count nor a goal; allowed: one of them")
+    return fewest(planner, planner.goal)
 
 
 def _check_files(options: OptimalOptions) -> None:
@@ -91,9 +104,10 @@ def _files(
 
 
 def _comments(found: OptimalPlan) -> Iterator[str]:
+    option = "--optimal" if found.goal is None else f"--until {found.goal.text}"
     yield (
         f"{len(found.reasons)} geometries for {', '.join(found.asked)}, chosen by gonio plan "
-        f"--optimal from {found.chosen.loaded.protocol_path.name}"
+        f"{option} from {found.chosen.loaded.protocol_path.name}"
     )
     yield f"for a sample like {found.sample.text}."
 

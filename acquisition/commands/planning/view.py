@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from acquisition.design.forecast import UNDETERMINED
 from acquisition.design.optimal_plan import OptimalPlan, Planned
 from acquisition.terminal.console import duration_text, out, print_lines, print_notes, print_text
 from acquisition.terminal.layout import table_lines
@@ -15,7 +16,7 @@ UNITS = {"1": "", "degrees": "°"}
 """Units of parameters as people write them."""
 
 _HEADER = ("geometry", "theta_i (deg)", "dphi (deg)", "theta_r (deg)", "for")
-_UNDETERMINED = 0.25  # of a parameter's domain: a u beyond it says nothing
+_SOURCES = 3  # of the error of a parameter that a note names
 
 
 def print_optimal(found: OptimalPlan) -> None:
@@ -55,7 +56,7 @@ def _u_rows(found: OptimalPlan) -> Iterator[tuple[str, ...]]:
 
 def _u_text(planned: Planned, parameter: Parameter) -> str:
     u = planned.u[parameter.name]
-    if u > _UNDETERMINED * (parameter.high - parameter.low):
+    if u > UNDETERMINED * (parameter.high - parameter.low):
         return "not determined"
     return f"{u:.2g} {UNITS.get(parameter.unit, parameter.unit)}".rstrip()
 
@@ -71,6 +72,11 @@ def _notes(found: OptimalPlan) -> Iterator[str]:
             "no even sweeps of this time: two views at each setting of the lamp take more, or a "
             "keep-out zone bars the way"
         )
+    if found.goal is not None:
+        yield f"as few as reach {found.goal.text}: one geometry fewer would not"
+    for name, sources in found.sources.items():
+        parts = ", ".join(f"{100 * p:.0f} % {s}" for s, p in list(sources.items())[:_SOURCES])
+        yield f"variance of {name}: {parts}"
     together = " together" if len(found.asked) > 1 else ""
     yield (
         f"no other {len(found.reasons)} of the candidates, repeated or not, can have less than "
@@ -102,6 +108,7 @@ def optimal_json(found: OptimalPlan) -> dict[str, Any]:
             "parameters": dict(zip(parameters, found.sample.x.tolist(), strict=True)),
         },
         "for": list(found.asked),
+        "until": found.goal and dict(found.goal.u),
         "candidates": found.candidates,
         "geometries": [
             {
@@ -115,6 +122,7 @@ def optimal_json(found: OptimalPlan) -> dict[str, Any]:
         "optimal": _planned_json(found.chosen),
         "even_sweeps_same_time": found.same_time and _planned_json(found.same_time),
         "sweeps": _planned_json(found.sweeps),
+        "parts_of_variance": found.sources,
         "least_part_of_u": found.efficiency,
         "other_models_chi2": found.rivals,
     }

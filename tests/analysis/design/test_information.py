@@ -69,6 +69,31 @@ def test_repeating_a_point_does_not_average_the_error_of_its_own_angles() -> Non
     assert covariance.u_total[0] > 20 * covariance.u_independent[0]
 
 
+def test_a_goal_of_the_u_that_all_points_give_weighs_as_no_goal_does() -> None:
+    found = information(planned(THETA_I, THETA_R, u=0.004, shared=_with_shared_errors()))
+    u = found.u(np.ones(N))
+    asked = ("albedo", "sigma_deg")
+    assert found.weights(asked, u) == pytest.approx(found.weights(asked))
+    half = found.weights(asked, u | {"albedo": u["albedo"] / 2})
+    assert half[0] == pytest.approx(4 * found.weights(asked)[0])
+
+
+def test_the_parts_of_a_variance_are_those_of_the_best_estimate() -> None:
+    """Each is what the error does to the estimate; random errors of a known size confirm it."""
+    m = planned(THETA_I, THETA_R, u=0.004, shared=_with_shared_errors(), u_theta_i_deg=0.1)
+    problem, x = assumed_problem(GLOSSY, FOAM, m)
+    found = Information.of(problem, x)
+    independent, shared = found.parts(np.ones(N), "sigma_deg")
+    W = problem.jacobian(x)
+    estimate = np.linalg.solve(W.T @ W, W.T)[1]
+    common = np.asarray(problem.covariance.common)
+    expected = np.square(estimate @ problem.covariance.whiten(common))
+    variance = found.u(np.ones(N))["sigma_deg"] ** 2
+    assert shared == pytest.approx(expected / variance, rel=1e-3, abs=1e-6)
+    assert independent + shared.sum() == pytest.approx(1)
+    assert len(found.errors) == shared.size
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_further_point_never_makes_any_u_larger(seed: int) -> None:
     rng = np.random.default_rng(seed)

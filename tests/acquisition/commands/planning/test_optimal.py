@@ -69,11 +69,27 @@ def test_the_tables_and_notes_in_the_terminal(protocol: Path, tmp_path: Path) ->
         assert words in picture
 
 
+def test_until_a_u_is_reached_with_the_fewest_geometries(protocol: Path, tmp_path: Path) -> None:
+    goal, out = {"sigma_deg": 0.03, "albedo": 0.004}, tmp_path / "few.yaml"
+    text = ",".join(f"{name}={u}" for name, u in goal.items())
+    done = gonio_here("plan", protocol, "--until", text, "--out", out, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["until"] == goal
+    assert f"--until {text}" in out.read_text().replace("\n# ", " ")
+    assert all(found["optimal"]["u"][name] <= u for name, u in goal.items())
+    for name in goal:
+        assert sum(found["parts_of_variance"][name].values()) == pytest.approx(1)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--out", "x.yaml"], "gonio plan: --out: allowed with --optimal N only"),
-        (["--for", "ks", "--chart", "x.png"], "--for, --chart: allowed with --optimal N only"),
+        (["--out", "x.yaml"], "gonio plan: --out: allowed with --optimal N or --until only"),
+        (
+            ["--for", "ks", "--chart", "x.png"],
+            "--for, --chart: allowed with --optimal N or --until",
+        ),
         (["--optimal", 8, "--for", "n"], "has no parameter n; allowed: albedo, sigma_deg, ks"),
         (["--optimal", 2], "--optimal 2; allowed: 3, the parameters to determine, to 30"),
         (["--optimal", 31], "--optimal 31; allowed: 3"),
@@ -81,6 +97,9 @@ def test_the_tables_and_notes_in_the_terminal(protocol: Path, tmp_path: Path) ->
         (["--optimal", 8, "--chart", "x.gif"], "x.gif: --chart must end in .png, .svg, .pdf"),
         (["--optimal", 8, "--out", "no/x.yaml"], "there is no folder no; make it first"),
         (["--optimal", 8, "--out", "taken.yaml"], "taken.yaml: exists already"),
+        (["--until", "sigma_deg=1", "--optimal", 8], "--optimal: not allowed with --until"),
+        (["--until", "sigma_deg=1", "--for", "ks"], "--for: not allowed with --until"),
+        (["--until", "sigma_deg=1e-9"], "--until sigma_deg=1e-09: all 30 candidates together"),
         (["--optimal", 8, "--like", "lambert"], "--like lambert: lambert needs albedo"),
     ],
 )
