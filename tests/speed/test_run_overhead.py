@@ -76,7 +76,8 @@ def test_the_demonstration_costs_a_few_times_the_import_of_its_libraries(
 ) -> None:
     """Measured on one core of 2 GHz: 4.8 s, of which the libraries' imports are 0.78 s.
 
-    The interlocks take 1.7 s of it, 15 ms for each series of frames: they look at its picture.
+    The interlocks take 1.7 s of it, 15 ms for each series of frames: they look at its picture. The
+    report's charts, drawn for two widths, take 1.2 s. A busy machine slows the parts unequally.
     """
     found = []
     for n in range(5 if slow else 1):
@@ -88,4 +89,4 @@ def test_the_demonstration_costs_a_few_times_the_import_of_its_libraries(
     for name, value in figures.items():
         record_property(name, f"{value:.2f}")
         sys.stdout.write(f"{name} {value:.2f}\n")
-    assert cpu_s < 8 * libraries
+    assert cpu_s < 10 * libraries
