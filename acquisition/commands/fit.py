@@ -12,7 +12,7 @@ from acquisition.commands.outcomes.new_folder import require_new_folder, write_f
 from acquisition.commands.views import parameter_lines
 from acquisition.results.model_check import check_model
 from acquisition.results.sources import Source, Wanted, read_source
-from acquisition.results.summary import VERDICTS, paper_ratio_note, parameters_of
+from acquisition.results.summary import paper_ratio_note, parameters_of, verdict_sentence
 from acquisition.terminal.console import console, out, print_lines, print_notes, print_text
 from acquisition.terminal.layout import table_lines, wrapped
 from acquisition.terminal.progress import sign_of_life
@@ -86,7 +86,7 @@ def _choice(
 def _write(
     folder: Path, path: Path, source: Source, choice: Choice | None, fit: Mapping[str, object]
 ) -> None:
-    """Write the report and fit.json, and say where they are."""
+    """Write the files of the fit, and say where the report is."""
     from acquisition.commands.outcomes.fit_report import fit_files  # heavy: the charts' library
 
     remarks = _remarks(source, choice)
@@ -140,7 +140,7 @@ def _print(source: Source, choice: Choice) -> None:
     if chosen is None:
         print_text(f"{choice.verdict}: {choice.reason}")
         return
-    print_text(f"{chosen.model}: {VERDICTS[choice.verdict]}.")
+    print_text(verdict_sentence(choice, choice.reason))
     print_lines(["", *parameter_lines(parameters_of(chosen), out.width), ""])
     print_lines([*_table(choice, chosen, out.width), ""])
     print_notes(_remarks(source, choice))

@@ -34,10 +34,11 @@ from instrument.errors import InputError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Planned:
-    """A plan with the u of each parameter, in its unit, that it will give."""
+    """A plan with its forecast; u: of each parameter, in its unit, that it will give."""
 
     loaded: Loaded
     plan: Plan
+    forecast: Forecast
     u: dict[str, float]
 
     @property
@@ -177,7 +178,8 @@ class Planner:
         return quicker(self.loaded, uniform(settings_of(self.own), views))
 
     def _planned(self, loaded: Loaded, plan: Plan) -> Planned:
-        return Planned(loaded=loaded, plan=plan, u=forecast(loaded, plan, self.sample).u())
+        found = forecast(loaded, plan, self.sample)
+        return Planned(loaded=loaded, plan=plan, forecast=found, u=found.u())
 
     def optimal(self, count: int, seed: int = 0) -> OptimalPlan:
         """Choose `count` geometries, and compare them with the sweeps."""
@@ -203,8 +205,7 @@ class Planner:
 
     def sources(self, planned: Planned) -> dict[str, dict[str, float]]:
         """Parts of the variance of each parameter asked for, by the source of error."""
-        found = forecast(planned.loaded, planned.plan, self.sample)
-        return {name: found.sources(name) for name in self.asked}
+        return {name: planned.forecast.sources(name) for name in self.asked}
 
     @property
     def _wanted(self) -> Mapping[str, float] | None:

@@ -35,6 +35,7 @@ from acquisition.results.reduction import (
     Reduced,
     standard_of,
 )
+from analysis.choice.choice import Choice
 from analysis.choice.notes import NoteCode
 from analysis.data.covariance import ANGLES
 from analysis.fit.fit import FitResult
@@ -77,9 +78,14 @@ _UNITS = {"degrees": "°", "1": ""}
 
 def headline(fitted: Fitted) -> str:
     """Return the chosen model and the verdict on it, in one sentence."""
-    if fitted.choice is None or fitted.chosen is None:
-        return f"No model was fitted: {fitted.reason}."
-    return f"{fitted.chosen.model}: {VERDICTS[fitted.choice.verdict]}."
+    return verdict_sentence(fitted.choice, fitted.reason)
+
+
+def verdict_sentence(choice: Choice | None, reason: str) -> str:
+    """Return the chosen model and the verdict on it; the reason where no model was fitted."""
+    if choice is None or choice.chosen is None:
+        return f"No model was fitted: {reason}."
+    return f"{choice.chosen}: {VERDICTS[choice.verdict]}."
 
 
 def value_text(parameter: Parameter) -> str:

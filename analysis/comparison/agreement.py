@@ -122,8 +122,7 @@ def joint_columns(covariances: Sequence[Covariance], same: Collection[str]) -> F
     shape = len(covariances), covariances[0].variance.size
     columns: dict[object, FloatArray] = {}
     for k, covariance in enumerate(covariances):
-        own = covariance.common
-        dense = own if isinstance(own, np.ndarray) else own.toarray()
+        dense = covariance.common_dense
         for n, name in enumerate(covariance.names):
             shared = any(name.startswith(word) for word in same)
             column = columns.setdefault(name if shared else (k, n), np.zeros(shape))

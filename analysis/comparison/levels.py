@@ -56,7 +56,7 @@ def _nearer(runs: Sequence[Values]) -> list[Values]:
 def _times(run: Values, factor: FloatArray) -> Values:
     """The run times a factor (G,), with its uncertainties."""
     c = run.covariance
-    common = _dense(c) * factor[:, np.newaxis]
+    common = c.common_dense * factor[:, np.newaxis]
     covariance = Covariance(c.variance * np.square(factor), common, c.names)
     return replace(run, brdf=run.brdf * factor, covariance=covariance, model=run.model * factor)
 
@@ -65,10 +65,5 @@ def _without(run: Values, levels: Collection[str]) -> Values:
     """The run without the shared errors whose names begin with one of `levels`."""
     c = run.covariance
     kept = [n for n, name in enumerate(c.names) if not any(map(name.startswith, levels))]
-    covariance = Covariance(c.variance, _dense(c)[:, kept], tuple(c.names[n] for n in kept))
+    covariance = Covariance(c.variance, c.common_dense[:, kept], tuple(c.names[n] for n in kept))
     return replace(run, covariance=covariance)
-
-
-def _dense(covariance: Covariance) -> FloatArray:
-    own = covariance.common
-    return own if isinstance(own, np.ndarray) else np.asarray(own.toarray())

@@ -96,6 +96,11 @@ class Covariance:
         return Covariance(self.variance[points], self.common[points], self.names)
 
     @property
+    def common_dense(self) -> FloatArray:
+        """The shared errors (N, K) without sparsity, in the data's unit by one u."""
+        return _dense(self.common)
+
+    @property
     def u_total(self) -> FloatArray:
         """Standard uncertainty (N,) of each point, in the data's unit: root of C's diagonal."""
         return np.asarray(np.sqrt(self.variance + (self.common * self.common).sum(axis=1)))
@@ -124,8 +129,11 @@ def append_column(columns: Columns, column: FloatArray) -> Columns:
 
 def _product(left: Any, right: Any) -> FloatArray:
     """Dense matrix product of dense or sparse arrays (scipy's types do not mix them)."""
-    product = left @ right
-    return np.asarray(product if isinstance(product, np.ndarray) else product.toarray(), np.float64)
+    return _dense(left @ right)
+
+
+def _dense(matrix: Any) -> FloatArray:
+    return np.asarray(matrix if isinstance(matrix, np.ndarray) else matrix.toarray(), np.float64)
 
 
 def independent_covariance(measurements: Measurements) -> Covariance:

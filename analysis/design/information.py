@@ -51,9 +51,7 @@ class Information:
         gradients = problem.model.gradient(problem.geometry, **values)
         domain = problem.high - problem.low
         J = np.stack([gradients[p.name] for p in parameters], axis=1) * domain
-        common = covariance.common
-        shared = common if isinstance(common, np.ndarray) else common.toarray()
-        rows = np.hstack([J, shared]) / covariance.u_independent[:, np.newaxis]
+        rows = np.hstack([J, covariance.common_dense]) / covariance.u_independent[:, np.newaxis]
         return cls(names=tuple(values), domain=domain, rows=rows, errors=covariance.names)
 
     @property

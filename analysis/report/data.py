@@ -31,6 +31,11 @@ class Quantity(NamedTuple):
     unit: str
     column: str
 
+    @property
+    def title(self) -> str:
+        """The name as the first word of a heading or a line."""
+        return self.name[:1].upper() + self.name[1:]
+
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
@@ -148,16 +153,15 @@ class ReportData:
     def measured(self) -> Quantity:
         """The measured quantity: BRDF, relative BRDF, or radiance without a white tile."""
         if not self.has_brdf:
-            return Quantity("Radiance", "counts/s", "radiance_counts_per_s")
+            return Quantity("radiance", "counts/s", "radiance_counts_per_s")
         if self.relative_brdf:
-            return Quantity("Relative BRDF", "", "brdf_relative")
+            return Quantity("relative BRDF", "", "brdf_relative")
         return Quantity("BRDF", "1/sr", "brdf_per_sr")
 
     @property
     def quantity(self) -> str:
         """Name and unit of the measured quantity, as on an axis."""
         name, unit, _ = self.measured
-        name = name if name.startswith("BRDF") else name.lower().replace("brdf", "BRDF")
         return f"{name} ({unit})" if unit else name
 
     @property

@@ -33,6 +33,10 @@ class ReportFigure:
     caption: str
     drawings: Callable[[bool], list[Drawing]]
 
+    def section_html(self) -> str:
+        """Return the figure under its heading."""
+        return f'<h2 id="{self.name}">{self.heading}</h2>\n{self.html()}'
+
     def html(self) -> str:
         """Return the figure drawn for both widths; the page shows one of them."""
         wide, narrow = (
@@ -46,7 +50,7 @@ def chart_figures(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> list[Re
     """Return the figures of what was measured; none without a value."""
     if not sweeps:
         return []
-    name, quantity = data.measured.name, data.quantity
+    name, quantity = data.measured.title, data.quantity
     found = [
         ReportFigure(
             name="shape",

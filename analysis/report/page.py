@@ -81,7 +81,7 @@ def _charts(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
     figures = chart_figures(data, sweeps)
     if not figures:
         return '<h2 id="shape">Measured values</h2>\n<p>No geometry has a value to plot.</p>'
-    return "\n".join(f'<h2 id="{f.name}">{f.heading}</h2>\n{f.html()}' for f in figures)
+    return "\n".join(figure.section_html() for figure in figures)
 
 
 def _flagged(data: ReportData) -> str:
@@ -121,7 +121,7 @@ def _budget(data: ReportData, sweeps: tuple[PlottedSweep, ...]) -> str:
 
 def _drift(data: ReportData) -> str:
     figure = drift_figure(data)
-    return f'<h2 id="{figure.name}">{figure.heading}</h2>\n{figure.html()}' if figure else ""
+    return figure.section_html() if figure else ""
 
 
 def _percent(value: float) -> str:

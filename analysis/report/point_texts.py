@@ -26,7 +26,7 @@ def point_texts(data: ReportData, sweeps: Sequence[PlottedSweep]) -> list[str]:
     """Return one text (N,) for each point of the run, empty for a point that is in no chart."""
     texts = [""] * len(data.flags)
     value, u = data.value_and_u
-    name, unit, _ = data.measured
+    name, unit = data.measured.title, data.measured.unit
     for sweep in sweeps:
         for n, i in enumerate(sweep.at):
             angles = (("θᵢ", data.theta_i_deg), ("θᵣ", data.theta_r_deg), ("Δφ", data.dphi_deg))

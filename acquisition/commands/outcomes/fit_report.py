@@ -12,7 +12,7 @@ import numpy as np
 from acquisition.commands.outcomes.fitted_table import fitted_table
 from acquisition.results.report_inputs import candidates_of
 from acquisition.results.sources import Source
-from acquisition.results.summary import VERDICTS
+from acquisition.results.summary import verdict_sentence
 from acquisition.results.versions import LIBRARIES, versions_of
 from analysis.choice.choice import Choice
 from analysis.report.data import ReportData
@@ -41,15 +41,12 @@ def _report_data(
     m, chosen = source.measurements, None if choice is None else choice.best
     unknown = np.full(m.size, np.nan)
     u = unknown if m.u_random is None else m.u_random
-    said = f"No model was fitted: {reason}."
-    if choice is not None and chosen is not None:
-        said = f"{chosen.model}: {VERDICTS[choice.verdict]}."
-        u = u if chosen.u_total is None else chosen.u_total
+    u = u if chosen is None else chosen.u_total
     return ReportData(
         title=path.name,
         sample=source.sample,
         description="fitted by gonio fit; rig, pictures, drift and budget are known of a run only",
-        verdict=(said,),
+        verdict=(verdict_sentence(choice, reason),),
         verdict_kind="" if choice is None or chosen is None else choice.verdict,
         notes=tuple(notes),
         theta_i_deg=m.theta_i_deg,

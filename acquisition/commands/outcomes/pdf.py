@@ -48,7 +48,7 @@ def print_pdf(page: Path, browser: str) -> Path:
 
 def _run(browser: str, page: Path, printed: Path, folder: Path) -> str:
     """Run the browser and return the last line that it said, empty without one."""
-    # Chromium refuses to run as root in its sandbox; the page is the program's own, without script.
+    # Chromium refuses to run as root in its sandbox; the page and its script are the program's own.
     as_root = ["--no-sandbox"] if os.geteuid() == 0 else []
     command = [
         browser, *_QUIET, *as_root, f"--user-data-dir={folder / 'profile'}",

@@ -60,8 +60,7 @@ def _parameter_html(parameter: Parameter) -> str:
 def _value_of(parameter: Parameter) -> str:
     if parameter.u is None and parameter.interval is not None:
         low, high = (short_number(end, 4) for end in parameter.interval)
-        unit = f"\u00a0{parameter.unit}" if parameter.unit else ""
-        return escaped(f"not determined, in [{low}, {high}]{unit}")
+        return escaped(f"not determined, in [{low}, {high}]{_unit_of(parameter)}")
     return escaped(format_value(parameter.value, parameter.u, parameter.unit))
 
 
@@ -71,8 +70,13 @@ def _interval_html(parameter: Parameter) -> str:
         return ""
     half = _COVERAGE * parameter.u
     low, high = interval_text(parameter.value - half, parameter.value + half)
-    unit = f"\u00a0{parameter.unit}" if parameter.unit else ""
-    return f'<dd class="interval">95 %: {escaped(f"{low} to {high}{unit}")}</dd>'
+    text = f"{low} to {high}{_unit_of(parameter)}"
+    return f'<dd class="interval">95 %: {escaped(text)}</dd>'
+
+
+def _unit_of(parameter: Parameter) -> str:
+    """Unit as it follows a number, empty without one."""
+    return f"\u00a0{parameter.unit}" if parameter.unit else ""
 
 
 def candidates_html(data: ReportData) -> str:

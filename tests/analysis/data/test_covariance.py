@@ -18,7 +18,7 @@ from tests.support.models.derivatives import central_difference
 
 def matrix(C: Covariance) -> FloatArray:
     """C as a dense array (N, N)."""
-    common = C.common if isinstance(C.common, np.ndarray) else C.common.toarray()
+    common = C.common_dense
     return np.diag(C.variance) + common @ common.T
 
 
