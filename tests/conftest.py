@@ -50,6 +50,12 @@ def pytest_configure(config: pytest.Config) -> None:
             signal.signal(number, default)
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """One more worker than cores: many tests wait for a process or a device now and then."""
+    return len(os.sched_getaffinity(0)) + 1
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
     """Tests and modules stay to the end: the garbage collector need not look at them again."""
@@ -84,6 +90,17 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     reports = [r for kind in ("passed", "failed") for r in terminalreporter.getreports(kind)]
     for line in standstill.repetitions(reports):
         terminalreporter.write_line(line)
+
+
+@pytest.fixture(scope="module")
+def without_charts() -> Iterator[None]:
+    """Reports of commands in this process have empty pictures, for tests of other subjects.
+
+    Drawing takes more than half of the time of a small run.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("analysis.report.figure_list.embedded_svg", lambda *_: "<svg></svg>")
+        yield
 
 
 @pytest.fixture(scope="module")
