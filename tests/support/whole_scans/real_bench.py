@@ -16,6 +16,7 @@ import numpy as np
 from acquisition.benchmark.corrections.real_bench import drawn_defects
 from acquisition.results.fitting import measurements
 from acquisition.results.reduction import reduced_run
+from analysis.data.measurements import Measurements
 from instrument.config.load import Loaded, load_protocol
 from instrument.config.protocol import DriftCheck, References, SimulatedSample
 from instrument.config.rig import Rig, Simulation
@@ -53,19 +54,41 @@ def real_bench_run(
 ) -> Loaded:
     """Configuration of run `number`, which is its seed, of a series.
 
-    `lines` replace some of the rig's. The error of the tile's certificate, the largest of all,
-    takes each part of its distribution once in the series.
+    `lines` replace some of the rig's.
     """
-    loaded = load_protocol(
-        CONFIGS / "protocols" / "demo.yaml", CONFIGS / "rigs" / "bench_real.yaml"
-    )
-    small = shrunk(loaded, _SHRINK)
     sweep = {
         "theta_i_deg": list(INCIDENCES_DEG[number // len(SAMPLES) % len(INCIDENCES_DEG)]),
         "dphi_deg": [0.0],
         "theta_r_deg": list(VIEWS_DEG),
     }
-    rig = _drawn_rig(small.rig, number, lines or {})
+    return changed(
+        _on_drawn_bench("demo", 7, number, folder, series, lines or {}),
+        sweeps=[sweep],
+        frames_per_point=frames,
+        simulated_sample=SAMPLES[number % len(SAMPLES)],
+    )
+
+
+def plaster_run(number: int, folder: Path, series: int, views: int) -> Loaded:
+    """Configuration of run `number` of a series: sample A of the paper, with so many views."""
+    loaded = _on_drawn_bench("plaster_a", 25, number, folder, series, {})
+    (sweep,) = loaded.protocol.sweeps
+    return changed(loaded, sweeps=[{**sweep, "theta_r_deg": list(np.linspace(-75, 75, views))}])
+
+
+def _on_drawn_bench(
+    protocol: str, every_points: int, number: int, folder: Path, series: int, lines: dict[str, Any]
+) -> Loaded:
+    """A shipped protocol on a calibrated bench with drawn defects, with drift checks.
+
+    The error of the tile's certificate, the largest of all, takes each part of its distribution
+    once in the series.
+    """
+    loaded = load_protocol(
+        CONFIGS / "protocols" / f"{protocol}.yaml", CONFIGS / "rigs" / "bench_real.yaml"
+    )
+    small = shrunk(loaded, _SHRINK)
+    rig = _drawn_rig(small.rig, number, lines)
     tile = rig.simulation.tile
     assert tile is not None
     new = tile.model_copy(update={"aged": 0.0})
@@ -74,15 +97,12 @@ def real_bench_run(
     text = table_text(new, _U_TILE, _U_TILE_COMMON, np.random.default_rng([number, 3]), common)
     references = References(
         white_tile=tabled(text, folder, frames=4),
-        drift_check=DriftCheck(theta_r_deg=10.0, every_points=7),
+        drift_check=DriftCheck(theta_r_deg=10.0, every_points=every_points),
     )
     return changed(
         small,
         rig={"uncertainty": rig.uncertainty, "simulation": rig.simulation},
-        sweeps=[sweep],
         references=references,
-        frames_per_point=frames,
-        simulated_sample=SAMPLES[number % len(SAMPLES)],
     )
 
 
@@ -100,7 +120,11 @@ def _drawn_rig(rig: Rig, seed: int, lines: dict[str, Any]) -> Rig:
 
 def pulls_of(loaded: Loaded, folder: Path) -> Deviations:
     """Scan, reduce, and fit the true model; compare with the truth."""
+    return deviations(measured(loaded, folder), loaded)
+
+
+def measured(loaded: Loaded, folder: Path) -> Measurements:
+    """Scan and reduce; return the values as a fit takes them."""
     with Record.create(folder, {}) as record:
         scan(loaded, record)
-        m = measurements(reduced_run(record, loaded), loaded)
-    return deviations(m, loaded)
+        return measurements(reduced_run(record, loaded), loaded)
