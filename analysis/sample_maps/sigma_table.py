@@ -41,7 +41,7 @@ class SigmaTable:
 
     @classmethod
     def of(cls, model: str, geometry: Geometry) -> SigmaTable:
-        """Return the table of a model at geometries (K,); `ValueError` if it is not in `MAPPED`."""
+        """Return a table in 1/sr at geometries (K,); `ValueError` for a model not in `MAPPED`."""
         if model not in MAPPED:
             raise ValueError(f"model {model!r}; allowed for a map: {', '.join(MAPPED)}")
         terms = named_terms(MODELS[model])
