@@ -1,18 +1,25 @@
-"""TIFF files of all frames, for protocols with `keep_frames`: written before their reading."""
+"""TIFF files of all frames and darks, for protocols with `keep_frames`.
+
+The frames of a step are written before its reading.
+"""
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.measure.radiometry import Dark
+from acquisition.measure.rectify.kept_files import FOLDER, dark_name, frame_name
 from acquisition.plan.plan import Plan
 from instrument.config.load import Loaded
 from instrument.devices import Frame
 from instrument.errors import InputError, StorageError
 from instrument.text.atomic_file import explain_os_error, make_folder, write_whole
-
-FOLDER = "frames"
 
 
 def write_frames(frames: Sequence[Frame], step: int, run: Path) -> list[str]:
@@ -20,17 +27,29 @@ def write_frames(frames: Sequence[Frame], step: int, run: Path) -> list[str]:
 
     Raises `StorageError` if a file cannot be written, or would be written outside the run.
     """
+    names = [frame_name(step, number) for number in range(len(frames))]
+    _write({name: frame.image for name, frame in zip(names, frames, strict=True)}, run)
+    return names
+
+
+def write_dark(dark: Dark, run: Path) -> None:
+    """Write the mean dark of an exposure, linear counts as 32-bit floats, into the run's folder.
+
+    One that is taken again replaces it. Raises `StorageError` as `write_frames` does.
+    """
+    _write({dark_name(dark.exposure_s): dark.mean.astype(np.float32)}, run)
+
+
+def _write(images: Mapping[str, NDArray[Any]], run: Path) -> None:
     import cv2
 
-    names = [f"{FOLDER}/{step:06d}-{number:04d}.tiff" for number in range(len(frames))]
     try:
         make_folder(run / FOLDER)
-        for name, frame in zip(names, frames, strict=True):
-            data = cv2.imencode(".tiff", frame.image)[1].tobytes()
+        for name, image in images.items():
+            data = cv2.imencode(".tiff", image)[1].tobytes()
             write_whole(run / name, data, linked_folder=False)
     except OSError as error:
         raise StorageError(f"{run / FOLDER}: {explain_os_error(error, run)}") from error
-    return names
 
 
 def require_own_folder(loaded: Loaded, run: Path) -> None:

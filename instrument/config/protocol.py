@@ -235,12 +235,24 @@ class FitConfig(Section):
             )
 
 
+class Variation(Section):
+    """Places of a simulated sample with other `parameters` of its model than the rest.
+
+    `pattern`: `halves`, those at x > 0; `gradient`, to which all change evenly along x, from the
+    left edge to the right one; `patch`, a square of `size_mm` in the middle.
+    """
+
+    pattern: Literal["halves", "gradient", "patch"]
+    parameters: Annotated[dict[str, Finite], Field(min_length=1)]
+    size_mm: Annotated[float, Field(gt=0, le=500)] = 10.0
+
+
 class SimulatedSample(Section):
     """True reflectance of the sample on a simulated rig; real rigs and the fit ignore it.
 
     `method` of computing its reflectance; auto: the cheapest that is accurate enough for the image.
     `mottling`: relative standard deviation of the albedo over the surface, in patches of
-    `mottling_size_mm`.
+    `mottling_size_mm`. `variation`: places with other parameters.
     """
 
     model: Name
@@ -248,6 +260,15 @@ class SimulatedSample(Section):
     method: Literal["auto", "exact"] = "auto"
     mottling: Annotated[float, Field(ge=0, le=0.3)] = 0.0
     mottling_size_mm: Annotated[float, Field(ge=0.2, le=1000)] = 2.0
+    variation: Variation | None = None
+
+    def with_share(self, share: float) -> SimulatedSample:
+        """Return the sample where `share` of the way to the variation's parameters is gone."""
+        if self.variation is None:
+            return self
+        other = {**self.parameters, **self.variation.parameters}
+        values = {k: (1 - share) * v + share * other[k] for k, v in self.parameters.items()}
+        return self.model_copy(update={"parameters": values})
 
 
 # Into a cell of a table: a spreadsheet takes a text that begins with = + - @ for a formula.

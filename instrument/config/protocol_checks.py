@@ -241,3 +241,15 @@ def _model_mistakes(protocol: MarkedYaml, check_model: ModelCheck) -> Mistakes:
             text = None if parameters is None else check_model(name, parameters)
             if text is not None:
                 yield at, text
+            elif parameters is not None:
+                yield from _variation_mistakes(protocol, name, parameters, check_model)
+
+
+def _variation_mistakes(
+    protocol: MarkedYaml, name: str, parameters: dict[str, float], check_model: ModelCheck
+) -> Mistakes:
+    at: KeyPath = ("simulated_sample", "variation", "parameters")
+    other = _valid(_PARAMETERS, protocol, *at)
+    text = None if other is None else check_model(name, {**parameters, **other})
+    if text is not None:
+        yield at, text

@@ -7,6 +7,7 @@ texture, sample outline and the cos^4 fall-off follow pixel by pixel.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -26,6 +27,7 @@ from sim.defects.mechanics import leaning_homography, turned
 from sim.defects.picture import scattered
 from sim.scene.board import print_on
 from sim.scene.scene import BOARD_PLACES, Scene
+from sim.scene.variation import blended, share_at, shares_to_render
 
 _NODES = 9  # per side: interpolation error below 4e-5 of the radiance, 5e-6 of an image's mean
 
@@ -108,13 +110,42 @@ def _surface_radiance(scene: Scene, projection: _Projection) -> FloatImage:
     columns_px, rows_px = np.meshgrid(outline.column + grid_x, outline.row + grid_y)
     pixels: FloatArray = np.stack([columns_px, rows_px], axis=-1)
     to_plane: FloatArray = np.linalg.inv(projection.table).astype(np.float64)
-    values = _radiance_at(scene, apply_homography(to_plane, pixels))
-    smooth: FloatImage = (matrix_y @ values.astype(np.float32)) @ matrix_x.T
+    points_mm = apply_homography(to_plane, pixels)
+    levels = [
+        (matrix_y @ _radiance_at(part, points_mm).astype(np.float32)) @ matrix_x.T
+        for part in _parts(scene)
+    ]
+    smooth: FloatImage = levels[0]
+    if len(levels) > 1:
+        smooth = blended(levels, _share(scene, projection)).astype(np.float32)
     if scene.mounted == "sample" and scene.sample.mottling > 0:
         smooth *= 1 + _texture(scene, projection)
     elif scene.mounted in BOARD_PLACES:
         smooth *= print_on(scene.board, projection.homography, outline)
     return smooth
+
+
+def _parts(scene: Scene) -> list[Scene]:
+    """The scene with the parameters of each part of its sample."""
+    if scene.mounted != "sample" or scene.sample.variation is None:
+        return [scene]
+    parts = []
+    for share in shares_to_render(scene.sample.variation):
+        part = copy(scene)
+        part.sample = scene.sample.with_share(share)
+        parts.append(part)
+    return parts
+
+
+def _share(scene: Scene, projection: _Projection) -> FloatArray:
+    """Share of the sample's other parameters over the outline's crop."""
+    assert scene.sample.variation is not None
+    columns, rows = np.meshgrid(
+        *(np.arange(s.start, s.stop) for s in projection.outline.crop[::-1])
+    )
+    to_surface = np.linalg.inv(projection.homography).astype(np.float64)
+    points_mm = apply_homography(to_surface, np.stack([columns, rows], axis=-1))
+    return share_at(points_mm, scene.sample.variation, scene.sample_size)
 
 
 def _chebyshev_grid(pixels: int) -> tuple[FloatArray, FloatImage]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from acquisition.engine.exposure.check import ExposureCheck
 from acquisition.engine.exposure.search import ExposureSearch
+from acquisition.engine.frame_files import write_dark
 from acquisition.engine.retrying_camera import RetryingCamera
 from acquisition.interlocks.darks import REFERENCE_FRAMES, DarkCheck, Excess
 from acquisition.interlocks.doubt import doubt_text
@@ -248,6 +249,8 @@ class Exposer:
         if found.light_dn > 0:
             log.warning("darks: %s: subtracted, and taken as uncertain", found.text())
         self._darks[dark.exposure_s] = replace(dark, light_dn=found.light_dn)
+        if self.protocol.keep_frames:
+            write_dark(dark, self.record.folder)
         mean, noise = float(dark.mean.mean()), float(np.sqrt(dark.variance.mean()))
         time_utc = self.clock.utc().isoformat()
         self.record.add_dark(time_utc, dark.exposure_s, dark.frames, mean, noise)

@@ -12,7 +12,7 @@ import threading
 from collections.abc import Iterable
 from pathlib import Path
 
-from acquisition.engine.frame_files import FOLDER
+from acquisition.measure.rectify.kept_files import FOLDER
 from acquisition.results.run_folder import load_run_inputs
 from instrument.closeable import Closeable
 from instrument.record.event_kinds import DAMAGED, RESUMED

@@ -9,6 +9,7 @@ import cv2
 import pytest
 
 from acquisition.engine.frame_files import frame_bytes, require_disk_space, require_own_folder
+from acquisition.measure.rectify.kept_files import dark_name, step_of
 from acquisition.plan.plan import make_plan
 from instrument.errors import InputError, StorageError
 from instrument.record.record import Record
@@ -39,7 +40,14 @@ def test_kept_frames_are_whole_and_named_in_the_record(tmp_path: Path) -> None:
         files = record.frame_files()
         readings = record.readings()
     assert len(files) == sum(r.frames for r in readings)
-    assert sorted(files) == sorted(f"frames/{p.name}" for p in (tmp_path / "run/frames").iterdir())
+    kept = {f"frames/{path.name}" for path in (tmp_path / "run/frames").iterdir()}
+    darks = {dark_name(reading.exposure_s) for reading in readings}
+    assert kept == {*files, *darks}
+    assert [step_of(name) for name in files] == [r.step for r in readings for _ in range(r.frames)]
+    for name in darks:
+        dark = cv2.imread(str(tmp_path / "run" / name), cv2.IMREAD_UNCHANGED)
+        assert dark.dtype == "float32"
+        assert dark.mean() == pytest.approx(LOADED.rig.camera.black_level_dn, abs=2)
     image = cv2.imread(str(tmp_path / "run" / files[0]), cv2.IMREAD_UNCHANGED)
     assert image.shape == (LOADED.rig.camera.height_px, LOADED.rig.camera.width_px)
     assert image.dtype == "uint16"

@@ -1,0 +1,56 @@
+"""Light of each pixel: mean of frames, made linear, less the dark, and even over the picture.
+
+The same steps as those of the window's mean (`acquisition.measure.radiometry`), for all pixels. Hot
+pixels take the median of their neighbours, and saturated ones have no value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.measure.radiometry import SATURATION_FRACTION
+from instrument.config.camera import CameraConfig
+from instrument.geometry import BoolArray
+from instrument.pinhole import Pinhole
+
+FloatImage = NDArray[np.float32]
+
+
+def light_dn(
+    images: Sequence[NDArray[Any]],
+    dark_dn: NDArray[Any] | float,
+    hot: BoolArray | None,
+    camera: CameraConfig,
+    pinhole: Pinhole,
+) -> FloatImage:
+    """Return the light of each pixel in DN, (rows, columns), NaN where any frame is saturated.
+
+    images: counts (rows, columns). dark_dn: mean dark in linear counts, of the same shape or one
+    for all. hot: True for a hot pixel. Divided by cos^4, as the window's weights are.
+    """
+    import cv2
+
+    total = camera.linear_dn(images[0]).astype(np.float32)
+    for image in images[1:]:
+        total += camera.linear_dn(image)
+    total /= len(images)
+    total -= np.asarray(dark_dn, dtype=np.float32)
+    if hot is not None and hot.any():
+        total[hot] = cv2.medianBlur(total, 3)[hot]
+    limit = SATURATION_FRACTION * camera.max_dn
+    bright = np.any([image >= limit for image in images if int(image.max()) >= limit], axis=0)
+    total *= _per_cos4(pinhole)
+    if np.any(bright):
+        total[bright if hot is None else bright & ~hot] = np.nan
+    return total
+
+
+@lru_cache(maxsize=2)
+def _per_cos4(pinhole: Pinhole) -> FloatImage:
+    rows, columns = np.ogrid[: pinhole.height_px, : pinhole.width_px]
+    return (1 / pinhole.cos4(columns, rows)).astype(np.float32)
