@@ -11,6 +11,8 @@ import pytest
 from analysis.data.acceptance import Acceptance
 from analysis.fit.fit import fit
 from analysis.models import MODELS
+from instrument.config.load import Loaded
+from tests.support.scans import changed
 from tests.support.whole_scans.coverage_scans import Deviations, by_band, by_parameter
 from tests.support.whole_scans.real_bench import (
     measured,
@@ -63,6 +65,52 @@ def test_a_correction_that_is_left_out_shows(effect: str, slow: bool, tmp_path: 
         pytest.skip("with --slow")
     found = _pulls(tmp_path, 200, {effect: 0.0, f"u_{effect}": 0.0})
     assert abs(float(np.mean(by_band(found)["75 to 85 deg"]))) > 0.15
+
+
+def _out_of_plane(loaded: Loaded) -> Loaded:
+    (sweep,) = loaded.protocol.sweeps
+    return changed(loaded, sweeps=[{**sweep, "dphi_deg": [45.0]}])
+
+
+def _with_8_bits(loaded: Loaded) -> Loaded:
+    camera = loaded.rig.camera.model_copy(update={"bit_depth": 8, "black_level_dn": 8.0})
+    return changed(loaded, rig={"camera": camera})
+
+
+def _without_tile(loaded: Loaded) -> Loaded:
+    references = loaded.protocol.references.model_copy(update={"white_tile": None})
+    return changed(loaded, references=references)
+
+
+_OTHER_SCANS = {
+    "out of plane": _out_of_plane,
+    "camera with 8 bits": _with_8_bits,
+    "no white tile": _without_tile,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("other", _OTHER_SCANS)
+def test_deviations_of_other_scans_have_the_size_of_their_u(
+    other: str, slow: bool, tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
+    """`--slow`: 120 runs, the limits four standard errors wide; else one, not far off.
+
+    Without a tile only the parameters of the shape are compared.
+    """
+    change, runs = _OTHER_SCANS[other], 120 if slow else 1
+    loaded = (change(real_bench_run(number, tmp_path, runs)) for number in range(runs))
+    found = [pulls_of(one, tmp_path / str(number)) for number, one in enumerate(loaded)]
+    bands = {} if other == "no white tile" else by_band(found)
+    for name, own in {**bands, **by_parameter(found)}.items():
+        mean, sd = float(np.mean(own)), float(np.std(own))
+        covered = float(np.mean(np.abs(own) < _COVERED))
+        record_property(name, f"mean {mean:+.2f} u, sd {sd:.2f} u, within 1.96 u {covered:.1%}")
+        assert np.max(np.abs(own)) < 6, name
+        if slow:
+            independent = min(own.size, runs)
+            assert abs(mean) < 0.15 + 4 / np.sqrt(independent), name
+            assert abs(sd - 1) < 0.12 + 4 / np.sqrt(2 * independent), name
 
 
 def _plaster_error(number: int, folder: Path, views: int) -> dict[str, float]:
