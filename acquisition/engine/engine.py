@@ -36,7 +36,7 @@ from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
 from instrument.devices import Camera, Lamp, Operator, Surface
 from instrument.errors import DeviceError, Interlock, WrongRigFile
-from instrument.record.event_kinds import DRIFT, INTERLOCK, OPERATOR
+from instrument.record.event_kinds import DRIFT, INTERLOCK, OPERATOR, PLATE
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 
@@ -91,7 +91,7 @@ class Engine:
         note = partial(self._add_event, OPERATOR)
         self._positioner = Positioner(rig, devices.axes, self._lamp, devices.operator, note)
         scatter = FrameScatter(rig, partial(self._add_event, INTERLOCK))
-        self._reduction = FrameReduction(rig, protocol, scatter)
+        self._reduction = FrameReduction(rig, protocol, scatter, partial(self._add_event, PLATE))
         self._begun_step = (0, 0.0, 0.0)  # its index, and its begin in scan time and running time
         wait_s, clock = rig.camera.reconnect_s, devices.clock
         self._camera = WatchedCamera(devices.camera, rig.camera)
@@ -353,9 +353,8 @@ class Engine:
     def _begin_commit(self, exposed: Exposed, reading: Reading) -> None:
         step, record, preview = exposed.step, self._record, None
         if step.preview:
-            preview = make_preview(
-                exposed, self._reduction.window(step.pose), self._rig.camera.max_dn
-            )
+            window = self._reduction.window_of(exposed)
+            preview = make_preview(exposed, window, self._rig.camera.max_dn)
 
         def write() -> None:
             keeps = self._protocol.keep_frames

@@ -51,7 +51,21 @@ def window_at(
     height_mm: float,
     centre_mm: tuple[float, float] = (0.0, 0.0),
 ) -> Window:
-    """Return the window of a patch, centred at (x, y) from the axis, seen from theta_r (signed)."""
+    """Return the window of a patch, centred at (x, y) from the axis, seen from theta_r (signed).
+
+    The last ones are kept.
+    """
+    return new_window(theta_r_deg, pinhole, width_mm, height_mm, centre_mm)
+
+
+def new_window(
+    theta_r_deg: float,
+    pinhole: Pinhole,
+    width_mm: float,
+    height_mm: float,
+    centre_mm: tuple[float, float],
+) -> Window:
+    """Return a window as `window_at` does, which is not kept: of a place that no other has."""
     homography = pinhole.homography(theta_r_deg)
     outline = apply_homography(homography, rectangle_mm(width_mm, height_mm) + centre_mm)
     coverage = polygon_coverage(outline, pinhole.width_px, pinhole.height_px)

@@ -122,6 +122,25 @@ class PatchConfig(Section):
     min_pixels: Annotated[int, Field(ge=1, le=100_000_000)] = 100
 
 
+_MOST_MARKERS = 50  # in the dictionary
+_Mm = Annotated[float, Field(ge=-500, le=500, allow_inf_nan=False)]
+
+
+class Markers(Section):
+    """Markers beside the sample, on the plate that carries it: the window follows the plate.
+
+    They are those of OpenCV's dictionary DICT_4X4_50, upright at theta_r = 0, with white around
+    them. `size_mm`: side of the black square. `centres_mm`: x and y of the middle of marker 0, 1
+    and so on, from the middle of the sample.
+    """
+
+    size_mm: Annotated[float, Field(ge=1, le=100)]
+    centres_mm: Annotated[
+        list[Annotated[list[_Mm], Field(min_length=2, max_length=2)]],
+        Field(min_length=1, max_length=_MOST_MARKERS),
+    ]
+
+
 # At 90 degrees the sample is neither visible nor lit.
 ViewAngle = Annotated[float, Field(ge=-89.5, le=89.5)]
 
@@ -315,6 +334,7 @@ class Protocol(Section):
     sample: Sample
     sweeps: Annotated[list[SweepConfig], Field(min_length=1)]
     window: PatchConfig
+    markers: Markers | None = None
     frames_per_point: Annotated[int, Field(ge=1, le=10_000)] = 4
     dark_frames: Annotated[int, Field(ge=1, le=10_000)] = 8
     exposure_target: Annotated[float, Field(gt=0, lt=1)] = 0.7

@@ -15,7 +15,15 @@ from pydantic import TypeAdapter, ValidationError
 
 from instrument.config.axes import AXES, EMULATED, Axis
 from instrument.config.camera import DarkPatch
-from instrument.config.protocol import Angles, Degrees, DriftCheck, Steps, WhiteTile, angles_deg
+from instrument.config.protocol import (
+    Angles,
+    Degrees,
+    DriftCheck,
+    Markers,
+    Steps,
+    WhiteTile,
+    angles_deg,
+)
 from instrument.config.section import Finite, Name, Positive
 from instrument.config.yaml_positions import KeyPath, MarkedYaml
 
@@ -31,6 +39,7 @@ _ANGLES: TypeAdapter[Any] = TypeAdapter(Angles)
 _AXIS: TypeAdapter[Any] = TypeAdapter(Axis)
 _POSITIVE: TypeAdapter[Any] = TypeAdapter(Positive)
 _PATCH: TypeAdapter[Any] = TypeAdapter(DarkPatch)
+_MARKERS: TypeAdapter[Any] = TypeAdapter(Markers)
 _NAME: TypeAdapter[Any] = TypeAdapter(Name)
 _PARAMETERS: TypeAdapter[Any] = TypeAdapter(dict[str, Finite])
 
@@ -85,6 +94,7 @@ def own_mistakes(protocol: MarkedYaml, check_model: ModelCheck | None) -> Mistak
             if path[0] == "sweeps" and _impossible(axis, value):
                 yield path, f"{value:g} deg; allowed: {low:g} to {high:g} deg from the normal"
     yield from _window_past_surfaces(protocol)
+    yield from _markers_covered(protocol)
     yield from _repeated(protocol)
     if check_model is not None:
         yield from _model_mistakes(protocol, check_model)
@@ -100,6 +110,23 @@ def _window_past_surfaces(protocol: MarkedYaml) -> Mistakes:
         if window is not None and size is not None and window > size:
             text = f"{window:g} mm is larger than the {name}; allowed: at most {size:g} mm"
             yield ("window", key), text
+
+
+def _markers_covered(protocol: MarkedYaml) -> Mistakes:
+    """Yield markers that the sample covers, in whole or in part."""
+    markers = _valid(_MARKERS, protocol, "markers")
+    size = [_valid(_POSITIVE, protocol, "sample", key) for key in ("width_mm", "height_mm")]
+    if markers is None or None in size:
+        return
+    for number, centre in enumerate(markers.centres_mm):
+        free = [abs(at) - (own + markers.size_mm) / 2 for at, own in zip(centre, size, strict=True)]
+        if max(free) < 0:
+            yield (
+                ("markers", "centres_mm", number),
+                f"marker {number} at x {centre[0]:g}, y {centre[1]:g} mm is covered by the sample; "
+                f"allowed: beside it, x or y {(size[0] + markers.size_mm) / 2:g} or "
+                f"{(size[1] + markers.size_mm) / 2:g} mm or more from its middle",
+            )
 
 
 def _valid(kind: TypeAdapter[Any], marked: MarkedYaml, *path: str | int) -> Any:

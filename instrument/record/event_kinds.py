@@ -11,6 +11,7 @@ RETRY: Final = "retry"  # a warning of a driver: an exchange was repeated, a fra
 TROUBLE: Final = "trouble"  # an error of a driver that did not end the scan
 EXPOSURE: Final = "exposure"  # counts at two exposures, compared
 HOT: Final = "hot pixels"  # left out of the window's mean, with their positions
+PLATE: Final = "plate"  # where markers show the plate that carries the sample
 INTERLOCK: Final = "interlock"  # a measurement contradicts the physics: what was done about it
 STOPPED: Final = "stopped"  # the operator ended the scan
 FAULT: Final = "fault"  # a device or the disk ended the scan

@@ -25,8 +25,8 @@ from sim.defects.lamp import beam_profile, wall_radiance
 from sim.defects.lens import bent_by_lens, transmission
 from sim.defects.mechanics import leaning_homography, turned
 from sim.defects.picture import scattered
-from sim.scene.board import print_on
-from sim.scene.scene import BOARD_PLACES, Scene
+from sim.scene.board import marker_on, marker_size_mm, print_on
+from sim.scene.scene import BOARD_PLACES, PAPER, Scene
 from sim.scene.variation import blended, share_at, shares_to_render
 
 _NODES = 9  # per side: interpolation error below 4e-5 of the radiance, 5e-6 of an image's mean
@@ -53,6 +53,7 @@ def electrons_per_s(scene: Scene) -> FloatImage:
         (rig.camera.height_px, rig.camera.width_px), _background_radiance(scene), dtype=np.float32
     )
     _show_dark_patch(image, scene)
+    _show_markers(image, scene, projection.homography)
     crop = projection.outline.crop
     if projection.outline.fraction.size and scene.mounted is not None:
         covered = projection.outline.fraction.astype(np.float32)
@@ -88,6 +89,22 @@ def _show_dark_patch(image: FloatImage, scene: Scene) -> None:
     radiance_of_patch = _matt_radiance(scene, scene.patch_reflectance(patch))
     covered = outline.fraction.astype(np.float32)
     image[outline.crop] += covered * (np.float32(radiance_of_patch) - image[outline.crop])
+
+
+def _show_markers(image: FloatImage, scene: Scene, homography: FloatArray) -> None:
+    """Draw the markers on the plate of the sample, by the homography of points on the plate."""
+    if scene.markers is None or scene.mounted != "sample":
+        return
+    size = marker_size_mm(scene.markers.size_mm)
+    paper = _matt_radiance(scene, PAPER)
+    for number, (x, y) in enumerate(scene.markers.centres_mm):
+        own = homography @ np.array([[1.0, 0, x], [0, 1.0, y], [0, 0, 1.0]])
+        corners = apply_homography(own, rectangle_mm(size, size))
+        outline = polygon_coverage(corners, image.shape[1], image.shape[0])
+        if outline.fraction.size:
+            seen = np.float32(paper) * marker_on(number, scene.markers.size_mm, own, outline)
+            covered = outline.fraction.astype(np.float32)
+            image[outline.crop] += covered * (seen - image[outline.crop])
 
 
 def _background_radiance(scene: Scene) -> float:

@@ -21,7 +21,14 @@ from analysis.models import MODELS
 from instrument.board import Board
 from instrument.clock import Clock
 from instrument.config.camera import DarkPatch
-from instrument.config.protocol import PatchConfig, Protocol, Sample, SimulatedSample, WhiteTile
+from instrument.config.protocol import (
+    Markers,
+    PatchConfig,
+    Protocol,
+    Sample,
+    SimulatedSample,
+    WhiteTile,
+)
 from instrument.config.rig import Rig
 from instrument.config.simulated.defects import Placement
 from instrument.devices import BoardPlace, Surface
@@ -65,6 +72,7 @@ class Scene:
     needed for each place of the lamp. heights_mm: height of each surface above the rotation axis;
     that of the tile is drawn from the rig's uncertainty of placement; a board lies as the sample
     does. world: faults that no device reports. board: that which the operator may put there.
+    markers: on the plate of the sample.
     """
 
     rig: Rig
@@ -80,6 +88,7 @@ class Scene:
     rings: dict[tuple[str, float, float], IntArray] = field(default_factory=dict)
     world: World = SOUND
     board: Board = field(default_factory=Board)
+    markers: Markers | None = None
     _texture: FloatArray | None = None
     heights_mm: dict[Surface | BoardPlace, float] = field(init=False)
     _lamp_start_s: float = 0.0
@@ -101,7 +110,10 @@ class Scene:
         if protocol.simulated_sample is None:
             raise ValueError("the protocol has no simulated_sample: describe the sample")
         tile = protocol.references.white_tile
-        return cls(rig, protocol.simulated_sample, protocol.sample, protocol.window, tile)
+        return cls(
+            rig, protocol.simulated_sample, protocol.sample, protocol.window, tile,
+            markers=protocol.markers,
+        )  # fmt: skip
 
     @classmethod
     def of_white_sample(cls, rig: Rig, size_mm: float = 50.0) -> Scene:

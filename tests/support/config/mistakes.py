@@ -118,7 +118,7 @@ PROTOCOL_MISTAKES = {
         "point: 4",
         "point: 4\ncolour: red",
         "10:1: colour: unknown key; allowed: name, description, rig, sample, sweeps, window,"
-        " frames_per_point, dark_frames, exposure_target, keep_frames, references, fit,"
+        " markers, frames_per_point, dark_frames, exposure_target, keep_frames, references, fit,"
         " simulated_sample, metadata",
     ),
     "misspelt key that is required": (

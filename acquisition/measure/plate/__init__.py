@@ -1,0 +1,1 @@
+"""Place of the plate that carries the sample, from markers beside it in the scan's own frames."""
