@@ -119,7 +119,7 @@ def test_a_stopped_scan_is_resumed_where_it_ended(
     folder, rig = tmp_path / "run", tmp_path / "rig.yaml"
     rig.write_text(RIG.read_text().replace(*QUICK))
     process = command.start("run", protocol, "--rig", rig, "--out", folder)
-    wait_for_readings(folder, 5)
+    wait_for_readings(folder, 5, command)
     os.kill(process, signal.SIGTERM)
     stopped = command.finish()
     assert stopped.returncode == 4
@@ -130,9 +130,10 @@ def test_a_stopped_scan_is_resumed_where_it_ended(
     assert len(points(folder)) == 17  # in the eighteenth, camera and lamp obstruct each other
 
 
-def wait_for_readings(folder: Path, count: int) -> None:
-    end_s = time.monotonic() + 60
-    while time.monotonic() < end_s:
+def wait_for_readings(folder: Path, count: int, command: ReadyProcess) -> None:
+    """Wait until the scan that runs has so many readings; fail if it ends before."""
+    end_s = time.monotonic() + 120
+    while time.monotonic() < end_s and not command.has_ended():
         try:
             with sqlite3.connect(f"file:{folder / 'record.sqlite'}?mode=ro", uri=True) as record:
                 if record.execute("SELECT COUNT(*) FROM reading").fetchone()[0] >= count:
@@ -140,7 +141,8 @@ def wait_for_readings(folder: Path, count: int) -> None:
         except sqlite3.Error:
             pass  # does not exist yet
         time.sleep(0.01)
-    raise AssertionError(f"fewer than {count} readings after 60 s")
+    outcome = command.finish() if command.has_ended() else "after 120 s"
+    raise AssertionError(f"fewer than {count} readings: {outcome}")
 
 
 def test_devices_lists_the_identity_of_every_device(command: ReadyProcess) -> None:

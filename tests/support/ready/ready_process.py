@@ -7,11 +7,13 @@ has no threads and no terminal; it ends as a process does that was started with 
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -51,6 +53,7 @@ class ReadyProcess(Closeable):
         self._pipe = Connection(ours.detach())
         self._folder = tempfile.TemporaryDirectory()
         self._arguments: tuple[str, ...] = ()
+        self._running: int | None = None
 
     def close(self) -> None:
         """End the process; may be called twice."""
@@ -59,14 +62,26 @@ class ReadyProcess(Closeable):
         self._folder.cleanup()
 
     def start(self, *arguments: object, **environment: str) -> int:
-        """Start a call with these arguments and further variables; return its process number."""
+        """Start a call with these arguments and further variables; return its process number.
+
+        A call that a failed test has left behind is ended first.
+        """
+        if self._running is not None:
+            with suppress(ProcessLookupError):
+                os.kill(self._running, signal.SIGKILL)
+            self.finish()
         self._arguments = tuple(map(str, arguments))
         self._pipe.send((self._arguments, environment, self._folder.name))
-        return int(self._answer())
+        self._running = int(self._answer())
+        return self._running
+
+    def has_ended(self) -> bool:
+        """Return True once the call has ended, of which `finish` tells the outcome."""
+        return self._pipe.poll()
 
     def finish(self) -> subprocess.CompletedProcess[str]:
         """Wait for the end of the call."""
-        code = self._answer()
+        code, self._running = self._answer(), None
         out, err = (Path(self._folder.name, name).read_text() for name in ("out", "err"))
         return subprocess.CompletedProcess(self._arguments, code, out, err)
 
