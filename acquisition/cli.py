@@ -95,16 +95,26 @@ def run(
     protocol: ProtocolFile,
     rig: RigFile = None,
     out: OutFolder = None,
+    until: Annotated[
+        str | None,
+        typer.Option(
+            help="Choose geometries of the sweeps until these u are reached, as sigma_deg=0.2."
+        ),
+    ] = None,
+    budget_min: Annotated[
+        float | None, typer.Option(help="Bench time with --until, or a goal, in minutes.")
+    ] = None,
     live: Live = False,
     json: Json = False,
 ) -> None:
     """Run a scan from a protocol: measure, fit and report.
 
-    In a terminal, the key p pauses the scan and lets it go on.
+    In a terminal, the key p pauses the scan and lets it go on. With --until, or a goal in the
+    protocol, it chooses what to measure next from what it has measured.
     """
     from acquisition.commands.scan import run_protocol
 
-    run_protocol(protocol, rig, out, live=live, as_json=json)
+    run_protocol(protocol, rig, out, live=live, as_json=json, until=until, budget_min=budget_min)
 
 
 app.command()(plan)

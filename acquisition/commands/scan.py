@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from acquisition.commands.determinable import Determinable
 from acquisition.commands.fit_status import no_fit_reported, print_json, require_result
@@ -40,6 +41,9 @@ from instrument.errors import OperatorStop
 from instrument.record.event_kinds import DAMAGED, FAULT, FINISHED, RESUMED, STOPPED
 from instrument.record.record import Record
 
+if TYPE_CHECKING:
+    from acquisition.adaptive.chooser import Chooser
+
 _KILLED = (
     "The scan ended without a word: its program was killed, or the computer was switched off. What "
     "moved then went on to the end of its move, or may still be moving\n"
@@ -54,24 +58,64 @@ def run_protocol(
     *,
     as_json: bool,
     live: bool = False,
+    until: str | None = None,
+    budget_min: float | None = None,
 ) -> None:
     """Plan, scan, fit and report; `live`: with a page in the browser.
 
-    Raises `InputError` before anything moves; `DeviceError`, `StorageError` or `OperatorStop` where
-    the scan ends early.
+    until: goal of a scan that chooses its geometries, in place of the protocol's; budget_min: its
+    bench time in minutes. Raises `InputError` before anything moves; `DeviceError`,
+    `StorageError` or `OperatorStop` where the scan ends early.
     """
     loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
-    scan_into(loaded, out, lambda record: _finish(record, loaded, as_json), live=live)
+    loaded = _with_goal(loaded, until, budget_min)
+    scan_into(loaded, out, lambda record, used: _finish(record, used, as_json), live=live)
+
+
+def _with_goal(loaded: Loaded, until: str | None, budget_min: float | None) -> Loaded:
+    """Return the protocol with the goal of the options, if there are any."""
+    if until is None and budget_min is None:
+        return loaded
+    from acquisition.adaptive.candidate_list import with_goal  # heavy: only for such scans
+
+    return with_goal(loaded, until, budget_min)
+
+
+def _candidates(loaded: Loaded) -> tuple[Loaded, Chooser]:
+    """Return the list of candidates of a protocol with a goal, and the choice among them."""
+    from acquisition.adaptive.aims import Aims
+    from acquisition.adaptive.candidate_list import candidate_list
+    from acquisition.adaptive.course import chooser_of
+
+    Aims.of(loaded)  # its mistakes are named with their lines in the file as it is
+    listed = candidate_list(loaded)
+    return listed, chooser_of(listed, make_plan(listed))
+
+
+def _growing(chooser: Chooser, record: Record) -> Plan:
+    from acquisition.adaptive.course import chosen_while_measured
+
+    def say(text: str) -> None:
+        console.print(text, highlight=False, soft_wrap=True)
+
+    return chosen_while_measured(chooser, record, say)
 
 
 def scan_into(
-    loaded: Loaded, out: Path | None, finish: Callable[[Record], object], *, live: bool = False
+    loaded: Loaded,
+    out: Path | None,
+    finish: Callable[[Record, Loaded], object],
+    *,
+    live: bool = False,
 ) -> Path:
-    """Plan and scan into a new folder, then call `finish` with the complete record.
+    """Plan and scan into a new folder; call `finish` with the complete record and its protocol.
 
     `live`: show it in a browser meanwhile. Returns the folder: `out`, or one named after the
     protocol and the time. Raises as `run_protocol` does, and what `finish` raises.
     """
+    chooser = None
+    if loaded.protocol.goal is not None:
+        loaded, chooser = _candidates(loaded)
     plan = make_plan(loaded)
     if live:
         require_libraries()
@@ -86,8 +130,8 @@ def scan_into(
     ):
         write_run_inputs(record)
         with _shown(record, live):
-            scan(loaded, plan, record)
-            finish(record)
+            scan(loaded, plan if chooser is None else _growing(chooser, record), record)
+            finish(record, loaded)
     return folder
 
 
@@ -112,20 +156,34 @@ def resume_run(folder: Path, *, yes: bool, as_json: bool, live: bool = False) ->
     with orderly_end(), Record.open(folder, claim=True) as record:
         write_run_inputs(record)
         loaded = load_run_inputs(record)
-        plan = make_plan(loaded)
+        plan = _plan_of(loaded, record)
         progress = Progress.of(record)
         missing = progress.missing(plan)
-        if missing:
+        if missing or plan.growing:
             # Raises, before anything moves, where no way leads to the first missing pose.
-            moves_between(home_pose(loaded.rig), missing[0].pose, loaded.rig)
+            for step in missing[:1]:
+                moves_between(home_pose(loaded.rig), step.pose, loaded.rig)
             check_ready(loaded)
             require_own_folder(loaded, folder)
-            _confirm(yes, len(missing), record)
+            _confirm(yes, len(missing), record, growing=plan.growing)
             _remove_damaged(record)
+        elif plan.choosing is not None:
+            # It may have been killed before it said so.
+            record.set_meta("steps", str(len(plan.known)))
         with _shown(record, live):
-            if missing:
+            if missing or plan.growing:
                 scan(loaded, plan, record, progress)
             _finish(record, loaded, as_json)
+
+
+def _plan_of(loaded: Loaded, record: Record) -> Plan:
+    """Return the plan of a run that was begun; its choices so far are in its record."""
+    plan = make_plan(loaded)
+    if loaded.protocol.goal is None:
+        return plan
+    from acquisition.adaptive.course import chooser_of
+
+    return _growing(chooser_of(loaded, plan), record)
 
 
 def report_run(
@@ -210,16 +268,20 @@ def _finish(
     require_result(outcome.fit, f"{record.folder}: {outcome.state}")
 
 
-def _confirm(yes: bool, steps: int, record: Record) -> None:
-    """Ask whether the rig may move, unless `yes` says so; record who answered."""
+def _confirm(yes: bool, steps: int, record: Record, *, growing: bool = False) -> None:
+    """Ask whether the rig may move, unless `yes` says so; record who answered.
+
+    growing: more steps may be chosen beside those that are missing.
+    """
     ended = _ended_with(record)
     if yes:
         console.print(ended, end="", highlight=False, soft_wrap=True)
     else:
         last = f"{damage_text(record)}\n" if record.damaged() else ""
+        more = ", more may be chosen" if growing else ""
         require_yes(
-            f"{ended}{last}{steps} readings are missing or doubtful. Is the rig clear, may the "
-            "stage move?",
+            f"{ended}{last}{steps} readings are missing or doubtful{more}. Is the rig clear, may "
+            "the stage move?",
             "gonio resume: nobody to ask whether the rig may move: add --yes",
             "not resumed: nothing has moved",
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import closing
+from datetime import datetime
 from functools import partial
 
 from acquisition.engine.engine import Devices, Engine
@@ -75,8 +76,8 @@ def _run(
     clock, before = devices.clock, progress or Progress()
     begun_s = clock.now_s() - before.elapsed_s
     console.print(
-        f"{loaded.protocol.name}: {len(plan.points)} geometries, about "
-        f"{duration_text(plan.duration_s)} on the rig ({loaded.rig.name}), into {record.folder}",
+        f"{loaded.protocol.name}: {_extent(loaded, plan)} on the rig ({loaded.rig.name}), into "
+        f"{record.folder}",
         highlight=False,
         soft_wrap=True,
     )
@@ -103,10 +104,27 @@ def _run(
         with stopped_by_signals(stops), publisher.published(state, follow), pause_key(switch):
             engine.run(plan, progress)
     log.write()
-    record.add_event(clock.utc().isoformat(), FINISHED, f"{len(plan.steps)} steps")
+    record_finished(record, plan, clock.utc())
     record.set_meta("scan_s", f"{clock.now_s() - begun_s:.1f}")
     record.set_meta("finished_utc", clock.utc().isoformat(timespec="seconds"))
     console.print(_warnings(log), end="", highlight=False, soft_wrap=True)
+
+
+def _extent(loaded: Loaded, plan: Plan) -> str:
+    """Return how much there is to measure: the geometries, or the goal that ends the scan."""
+    if plan.choosing is None:
+        return f"{len(plan.points)} geometries, about {duration_text(plan.duration_s)}"
+    goal = ", ".join(f"u({n}) {g.u:g}" for n, g in (loaded.protocol.goal or {}).items())
+    budget = loaded.protocol.budget_min
+    limit = "" if budget is None else f", at most {budget:g} min"
+    return f"until {goal}{limit}, of {len(plan.points)} geometries"
+
+
+def record_finished(record: Record, plan: Plan, now: datetime) -> None:
+    """Record that all steps are measured; of a scan that chose them, how many they are."""
+    record.add_event(now.isoformat(), FINISHED, f"{len(plan.known)} steps")
+    if plan.choosing is not None:
+        record.set_meta("steps", str(len(plan.known)))
 
 
 def _record_end(record: Record, log: EventLogHandler, clock: Clock, kind: str, why: str) -> None:

@@ -38,6 +38,16 @@ def goal_of(text: str, sample: AssumedSample, loaded: Loaded) -> Goal:
     Raises `InputError` for a text of another form, a u that is not positive or says nothing, and a
     parameter that the model does not have or the scan does not determine.
     """
+    wanted = wanted_u(text)
+    names = asked_parameters(",".join(wanted), sample, loaded, "--until")
+    parameters = {p.name: p for p in sample.model.parameters}
+    for name in names:
+        _require_useful(wanted[name], parameters[name])
+    return Goal(wanted)
+
+
+def wanted_u(text: str) -> dict[str, float]:
+    """Return the u that `--until` names, by parameter; raise `InputError` for another form."""
     wanted: dict[str, float] = {}
     for part in text.split(","):
         name, _, number = (word.strip() for word in part.partition("="))
@@ -50,11 +60,7 @@ def goal_of(text: str, sample: AssumedSample, loaded: Loaded) -> Goal:
         if name in wanted:
             raise InputError(f"--until: {printable(name)} is named twice; allowed: once")
         wanted[name] = u
-    names = asked_parameters(",".join(wanted), sample, loaded, "--until")
-    parameters = {p.name: p for p in sample.model.parameters}
-    for name in names:
-        _require_useful(wanted[name], parameters[name])
-    return Goal(wanted)
+    return wanted
 
 
 def _require_useful(u: float, parameter: Parameter) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +13,23 @@ from instrument.config.load import Loaded
 from instrument.config.yaml_positions import read_yaml
 
 
-def protocol_text(chosen: Loaded, folder: Path, comments: Sequence[str]) -> str:
+def protocol_text(
+    chosen: Loaded,
+    folder: Path,
+    comments: Sequence[str],
+    *,
+    name: str | None = None,
+    more: Mapping[str, object] | None = None,
+) -> str:
     """Return the text of a file in `folder`: the protocol as read, with the sweeps of `chosen`.
 
     Paths of the rig and of a table of the white tile lead to the same files. Comments of the file
-    are lost; `comments` open it.
+    are lost; `comments` open it. name: of the protocol, by default its own with `_optimal`. more:
+    further entries, in place of its own.
     """
     data: dict[str, Any] = dict(read_yaml(chosen.protocol_text.encode()).data)
-    data["name"] = f"{chosen.protocol.name}_optimal"
+    data |= more or {}
+    data["name"] = name or f"{chosen.protocol.name}_optimal"
     data["rig"] = _path_from(folder, chosen.rig_path)
     tile = chosen.protocol.references.white_tile
     if tile is not None and tile.table is not None:

@@ -114,7 +114,7 @@ class Engine:
             self._register_devices()
             if progress is None:
                 self._begin(plan)
-                self._measure_all(plan, partial(self._scan, plan, plan.steps))
+                self._measure_all(plan, partial(self._measure, plan))
             else:
                 self._restore(plan, progress)
                 self._measure_all(plan, partial(self._go_on, plan, progress))
@@ -172,7 +172,7 @@ class Engine:
         """Restore the state in which the scan stopped, apart from its pose."""
         report_found(self._positioner.recover_position(), progress, self._rig)
         self._open_shutter()
-        self._exposer.restore(progress.readings)
+        self._exposer.restore(progress.by_time)
         self._exposer.take_darks(plan.darks_first_s, self._reduction.window(self._positioner.pose))
 
     def _measure_all(self, plan: Plan, measure: Callable[[], None]) -> None:
@@ -203,6 +203,8 @@ class Engine:
         The lamp is checked for drift at the first step, and wherever it is set again for a block
         of which readings are kept: one of them was damaged in the record.
         """
+        if not progress.missing(plan):
+            plan.more()  # the scan ended between two batches
         kept = {reading.block for reading in progress.readings}
         blocks = list(dict.fromkeys(step.block for step in progress.missing(plan)))
         for number, block in enumerate(blocks):
@@ -213,6 +215,17 @@ class Engine:
             self._record.allow_replacing(progress.doubtful)
             self._scan(plan, progress.missing_in(block, plan))
             progress = Progress.of(self._record)
+        self._measure_further(plan)
+
+    def _measure(self, plan: Plan) -> None:
+        """Measure all steps from the first on."""
+        self._scan(plan, plan.known)
+        self._measure_further(plan)
+
+    def _measure_further(self, plan: Plan) -> None:
+        """Measure what is chosen while the scan runs; each batch is on disk before the next."""
+        while batch := plan.more():
+            self._scan(plan, batch)
 
     def _continue_from(self, plan: Plan, progress: Progress, first: Step) -> None:
         """Check the lamp for drift, and return to the last accepted pose."""

@@ -50,8 +50,16 @@ class Progress:
         return frozenset(reading.step for reading in self.readings) - self.doubtful
 
     def references(self) -> list[Reading]:
-        """Return the tile readings and drift checks that stay."""
-        return [r for r in self.readings if r.kind != "point" and r.step in self.done]
+        """Return the tile readings and drift checks that stay, in order of time."""
+        return [r for r in self.by_time if r.kind != "point" and r.step in self.done]
+
+    @property
+    def by_time(self) -> list[Reading]:
+        """Readings in the order in which they were made.
+
+        A scan that chooses its steps has another order than the plan.
+        """
+        return sorted(self.readings, key=lambda reading: reading.time_s)
 
     @property
     def elapsed_s(self) -> float:
@@ -60,9 +68,9 @@ class Progress:
         return max((reading.free_s for reading in made), default=0.0)
 
     def missing(self, plan: Plan) -> tuple[Step, ...]:
-        """Return the steps still to be measured, in order."""
+        """Return the steps still to be measured, in order; of a choice, those made so far."""
         done = self.done
-        return tuple(step for step in plan.steps if step.index not in done)
+        return tuple(step for step in plan.known if step.index not in done)
 
     def missing_in(self, block: int, plan: Plan) -> list[Step]:
         """Return the steps of one block of the lamp that are still to be measured, in order."""

@@ -93,7 +93,7 @@ def run(protocol: Path | str, rig: Path | str | None = None, out: Path | str | N
             f"{loaded.rig_path}: its camera is emulated, which needs a process of its own: use the "
             "command gonio run, then gonio.load"
         )
-    return load(scan_into(loaded, None if out is None else Path(out), lambda r: finish(r, loaded)))
+    return load(scan_into(loaded, None if out is None else Path(out), finish))
 
 
 def _load(protocol: Path | str, rig: Path | str | None) -> Loaded:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol as Interface
 
 from acquisition.plan.exposure_ladder import expected_exposure_s, exposure_ladder_s
 from acquisition.plan.moves import Move, NoPathError, moves_between
@@ -49,12 +50,28 @@ class Step:
     preview: bool = False
 
 
+class Choosing(Interface):
+    """Choice among the steps of a plan while the scan runs, batch by batch."""
+
+    @property
+    def steps(self) -> Sequence[Step]:
+        """Steps chosen so far, in the order in which they are measured."""
+
+    @property
+    def ended(self) -> bool:
+        """True if nothing will be chosen any more."""
+
+    def more(self) -> Sequence[Step]:
+        """Choose the next batch, and record it; empty at the end."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
     """All steps in order, with the totals shown to the operator beforehand.
 
     `hidden`: poses left out. `darks_first_s`: exposures whose darks are taken before the first
     step. `swaps`: changes between sample and white tile. `hand_settings`: axes to set by hand.
+    `choosing`: who chooses among the steps, of which then only some are measured, in another order.
     """
 
     steps: tuple[Step, ...]
@@ -63,6 +80,21 @@ class Plan:
     duration_s: float
     swaps: int
     hand_settings: int
+    choosing: Choosing | None = None
+
+    @property
+    def known(self) -> Sequence[Step]:
+        """The steps to measure as far as they are known, in the order of measuring."""
+        return self.steps if self.choosing is None else self.choosing.steps
+
+    @property
+    def growing(self) -> bool:
+        """True if more steps may be chosen."""
+        return self.choosing is not None and not self.choosing.ended
+
+    def more(self) -> Sequence[Step]:
+        """Choose further steps; empty where all are known."""
+        return () if self.choosing is None else self.choosing.more()
 
     @property
     def points(self) -> tuple[Step, ...]:

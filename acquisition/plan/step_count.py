@@ -8,13 +8,30 @@ from acquisition.plan.plan import Plan, Step
 
 
 class StepCount:
-    """Accepted steps of a plan; `done`: indices of those accepted so far."""
+    """Accepted steps of a plan, of those that are known; `done`: indices of those accepted so far.
+
+    A scan that chooses its steps knows more of them as it goes on.
+    """
 
     def __init__(self, plan: Plan, done: Container[int]) -> None:
-        before = [step for step in plan.steps if step.index in done]
-        self.total, self.accepted = len(plan.steps), len(before)
-        self.planned_s = sum(step.duration_s for step in plan.steps)
+        before = [step for step in plan.known if step.index in done]
+        self._plan, self.accepted = plan, len(before)
         self.accepted_s = sum(step.duration_s for step in before)
+
+    @property
+    def total(self) -> int:
+        """Number of all steps that are known."""
+        return len(self._plan.known)
+
+    @property
+    def planned_s(self) -> float:
+        """Planned duration of all steps that are known, in seconds."""
+        return sum(step.duration_s for step in self._plan.known)
+
+    @property
+    def growing(self) -> bool:
+        """True if more steps may be chosen."""
+        return self._plan.growing
 
     @property
     def left_s(self) -> float:
@@ -23,8 +40,8 @@ class StepCount:
 
     @property
     def text(self) -> str:
-        """Accepted steps of all."""
-        return f"{self.accepted}/{self.total}"
+        """Accepted steps of all that are known."""
+        return f"{self.accepted}/{self.total}{'+' * self.growing}"
 
     def add(self, step: Step) -> None:
         """Count an accepted step."""

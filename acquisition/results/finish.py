@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from acquisition.results.facts.chosen_geometries import reasons
 from acquisition.results.fitting import fit_run
 from acquisition.results.measurements_csv import measurements_csv
 from acquisition.results.reduction import reduced_run
@@ -49,7 +50,7 @@ def finish(record: Record, loaded: Loaded) -> Outcome:
     u_brdf, parts = fitted.u_brdf(reduced), fitted.parts(reduced)
     said, remarks, fit = headline(fitted), notes(reduced, fitted, record, loaded), fitted.as_json()
     with _recovery_named(record.folder):
-        table = measurements_csv(reduced, u_brdf, parts, loaded)
+        table = measurements_csv(reduced, u_brdf, parts, loaded, reasons(record))
         write_whole(record.folder / "measurements.csv", table)
         write_whole(record.folder / "fit.json", json.dumps(fit, indent=2, allow_nan=False))
     content = report_data(

@@ -28,19 +28,26 @@ NO_BRDF = "no brdf"
 
 
 def measurements_csv(
-    reduced: Reduced, u_brdf: FloatArray, parts: Mapping[str, FloatArray], loaded: Loaded
+    reduced: Reduced,
+    u_brdf: FloatArray,
+    parts: Mapping[str, FloatArray],
+    loaded: Loaded,
+    reasons: Mapping[int, str] | None = None,
 ) -> str:
     """Return the text of the table; u_brdf (N,) in 1/sr, its parts by name (N,) and relative.
 
     After COLUMNS, which are documented, comes one column for each component of the uncertainty,
-    then what a fit needs, then the protocol's metadata as far as given. A value that is not known
-    is an empty cell.
+    then what a fit needs, then the protocol's metadata as far as given, and what a scan that
+    chose its geometries measured each for (`reasons`, by step). A value that is not known is an
+    empty cell.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     components = ((f"u_{n.replace(' ', '_')}_relative", _cells(u)) for n, u in parts.items())
     metadata = ((name, repeat(fact)) for name, fact in loaded.protocol.metadata.given().items())
     further = dict((*components, *_columns_for_fits(reduced, loaded), *metadata))
+    if reasons:
+        further["chosen_for"] = [reasons.get(p.step, "") for p in reduced.points]
     writer.writerow([*COLUMNS, *further])
     values = (reduced.radiance, reduced.u_radiance, reduced.brdf, u_brdf)
     cells = [_cells(value) for value in values]

@@ -21,6 +21,7 @@ from acquisition.results.effects.surface import (
     TILT_ACROSS,
     ZEROS,
 )
+from acquisition.results.facts.chosen_geometries import choice_note
 from acquisition.results.fitting import Fitted, u_without
 from acquisition.results.reduction import (
     DARK,
@@ -45,6 +46,7 @@ from analysis.report.style import format_value
 from instrument.config.load import Loaded
 from instrument.geometry import FloatArray
 from instrument.record.event_kinds import EXPOSURE, INTERLOCK, RESUMED, RETRY
+from instrument.record.reading import batches_of
 from instrument.record.record import Record
 
 Budget = tuple[tuple[str, float, float], ...]
@@ -168,6 +170,7 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         fitted.reason if fitted.choice is not None else "",
         *(note.text for note in of_fit if note.code != NoteCode.SEARCH_END),
         paper_ratio_note(fitted.chosen) if fitted.chosen is not None else "",
+        choice_note(record),
         _hidden_note(record),
         _flag_note(reduced),
         _drift_note(reduced),
@@ -248,6 +251,12 @@ def _unfinished_note(record: Record) -> str:
     planned, made = int(record.meta("steps") or 0), len(record.readings())
     if made >= planned:
         return ""
+    choices = batches_of(record.events())
+    if choices and not choices[-1].end:
+        return (
+            f"the scan is not finished: {made} readings, of geometries that it chooses; go on "
+            f"with: gonio resume {record.folder}"
+        )
     return (
         f"the scan is not finished: {made} of {planned} readings; go on with: "
         f"gonio resume {record.folder}"

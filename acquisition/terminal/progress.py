@@ -37,7 +37,8 @@ def scan_progress(plan: Plan, done: frozenset[int]) -> Iterator[OnStep]:
 def _line(counted: StepCount, step: Step) -> str:
     """Count an accepted step and return its line in a log."""
     counted.add(step)
-    return f"{counted.text} {_step_text(step)}, {duration_text(counted.left_s)} left"
+    left = " of those chosen" if counted.growing else ""
+    return f"{counted.text} {_step_text(step)}, {duration_text(counted.left_s)} left{left}"
 
 
 def _print(line: str) -> None:
@@ -62,7 +63,10 @@ def _bar(counted: StepCount) -> Iterator[OnStep]:
         def on_step(step: Step) -> None:
             counted.add(step)
             text = _step_text(step)
-            bar.update(task, advance=step.duration_s, description=text, count=counted.text)
+            bar.update(
+                task, completed=counted.accepted_s, total=counted.planned_s, description=text,
+                count=counted.text,
+            )  # fmt: skip
 
         yield on_step
 

@@ -28,6 +28,22 @@ def farthest(geometry: Geometry, count: int) -> BoolArray:
     return chosen
 
 
+def farthest_from(geometry: Geometry, chosen: BoolArray, allowed: BoolArray) -> int | None:
+    """Return the geometry, of those allowed (N,), that is the farthest from those chosen (N,).
+
+    The masks have no unit. None where all that are allowed are chosen; where none is chosen yet,
+    the one nearest to the middle of the list.
+    """
+    places, free = _places(geometry), allowed & ~chosen
+    if not free.any():
+        return None
+    if chosen.any():
+        apart = np.min([_squared(places, places[k]) for k in np.flatnonzero(chosen)], axis=0)
+    else:
+        apart = -_squared(places, places.mean(axis=0))
+    return int(np.argmax(np.where(free, np.round(apart / _SAME), -np.inf)))
+
+
 def _places(geometry: Geometry) -> FloatArray:
     """Unit vectors to lamp and camera, (N, 6), with the lamp in one plane for all."""
     camera = lamp_direction(geometry.theta_r_deg, geometry.dphi_deg)  # polar angle and azimuth

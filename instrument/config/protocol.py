@@ -325,8 +325,18 @@ def _in_text(fact: str | float) -> str:
     return fact.strip() if isinstance(fact, str) else f"{fact:.10g}"
 
 
+class GoalConfig(Section):
+    """Standard uncertainty `u` that a parameter is wanted with, in its unit."""
+
+    u: Positive
+
+
 class Protocol(Section):
-    """Complete protocol file."""
+    """Complete protocol file.
+
+    `goal`: u wanted of parameters, by name; the scan then chooses among the geometries of the
+    sweeps, and those between them, until it is reached, or `budget_min` minutes are spent.
+    """
 
     name: Name
     description: str = ""
@@ -343,3 +353,10 @@ class Protocol(Section):
     fit: FitConfig = FitConfig()
     simulated_sample: SimulatedSample | None = None
     metadata: Metadata = Metadata()
+    goal: Annotated[dict[str, GoalConfig], Field(min_length=1)] | None = None
+    budget_min: Positive | None = None
+
+    def mistakes(self) -> Iterator[tuple[str, str]]:
+        """Refuse a budget without a goal."""
+        if self.budget_min is not None and self.goal is None:
+            yield "budget_min", f"{self.budget_min:g} without a goal; allowed: beside goal"

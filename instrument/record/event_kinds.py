@@ -17,4 +17,5 @@ STOPPED: Final = "stopped"  # the operator ended the scan
 FAULT: Final = "fault"  # a device or the disk ended the scan
 RESUMED: Final = "resumed"  # the scan continued
 DAMAGED: Final = "damaged"  # rows that changed on the disk were removed, to be replaced
+CHOSEN: Final = "chosen"  # the steps that the scan measures next, and why: `reading.Batch`
 FINISHED: Final = "finished"  # the last step was accepted

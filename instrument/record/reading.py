@@ -1,13 +1,16 @@
-"""Rows of the run record: a measured geometry, a drift check at a resume, a preview."""
+"""Rows of the run record: a measured geometry, a drift check at a resume, a preview, a choice."""
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, Literal, NamedTuple
 
 from instrument.devices import Surface
+from instrument.record.event_kinds import CHOSEN
 
 Kind = Literal["point", "tile", "drift"]
 
@@ -107,3 +110,99 @@ class Rows(NamedTuple):
     readings: Sequence[Reading]
     checks: Sequence[Check]
     events: Sequence[tuple[str, str, str]]
+
+
+_MOST_STEP = 2**53
+_PLAIN = re.compile(r"([A-Za-z0-9][ -~]{0,99})?", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Batch:
+    """Steps that a scan chose to measure next: the text of an event of the kind `chosen`.
+
+    number: of the batch, from 0. steps: their numbers in the list of all, in the order in which
+    they are measured. reasons: one for each step. model, verdict: of the fit that the choice is
+    based on, empty without one; fitted: u of the parameters asked for by that fit; forecast: what
+    it would be after the batch before this one; checked: what a full fit then found, empty where
+    none was made. In the parameters' units; None for a u that is not known. seconds: expected time
+    of the scan to the end of the batch. end: why nothing is chosen after it, else empty.
+    """
+
+    number: int
+    steps: tuple[int, ...]
+    reasons: tuple[str, ...]
+    model: str = ""
+    verdict: str = ""
+    fitted: Mapping[str, float | None] = field(default_factory=dict)
+    forecast: Mapping[str, float | None] = field(default_factory=dict)
+    checked: Mapping[str, float | None] = field(default_factory=dict)
+    seconds: float = 0.0
+    end: str = ""
+
+    @property
+    def text(self) -> str:
+        """The batch as JSON."""
+        return json.dumps(asdict(self), allow_nan=False)
+
+    @classmethod
+    def of_text(cls, text: str) -> Batch:
+        """Return the batch of a text from anywhere; `ValueError` says what is wrong with it."""
+        try:
+            data = json.loads(text)
+        except RecursionError:
+            raise ValueError("is nested too deeply") from None
+        if not isinstance(data, dict) or set(data) != {f.name for f in fields(cls)}:
+            raise ValueError(f"allowed: JSON with {', '.join(f.name for f in fields(cls))}")
+        for name, allowed in _RULES.items():
+            if not _FITS[allowed](data[name]):
+                raise ValueError(f"{name} is {str(data[name])[:40]!r}; allowed: {allowed}")
+        if len(data["reasons"]) != len(data["steps"]):
+            raise ValueError(f"{len(data['reasons'])} reasons for {len(data['steps'])} steps")
+        lists = {name: tuple(data[name]) for name in ("steps", "reasons")}
+        return cls(**{**data, **lists})
+
+
+def batches_of(events: Iterable[tuple[str, str, str]]) -> list[Batch]:
+    """Return the choices among events (time, kind, text), in their order."""
+    return [Batch.of_text(text) for _, kind, text in events if kind == CHOSEN]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_step(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= _MOST_STEP
+
+
+def _are_steps(value: Any) -> bool:
+    own = isinstance(value, list) and all(map(_is_step, value))
+    return own and len(set(value)) == len(value)
+
+
+def _is_plain(value: Any) -> bool:
+    """Return True for a text that may stand in a cell of a table: no formula of a spreadsheet."""
+    return isinstance(value, str) and _PLAIN.fullmatch(value) is not None
+
+
+def _is_u(value: Any) -> bool:
+    return isinstance(value, dict) and all(
+        isinstance(name, str) and (u is None or (_is_number(u) and u >= 0))
+        for name, u in value.items()
+    )
+
+
+_STEP, _STEPS, _TEXT = "a whole number", "different whole numbers", "a text"
+_TEXTS, _U, _SECONDS = "plain words in ASCII", "u by name, 0 or more, or null", "a number"
+_RULES = {
+    "number": _STEP, "steps": _STEPS, "reasons": _TEXTS, "model": _TEXT, "verdict": _TEXT,
+    "fitted": _U, "forecast": _U, "checked": _U, "seconds": _SECONDS, "end": _TEXT,
+}  # fmt: skip
+_FITS = {
+    _STEP: _is_step,
+    _STEPS: _are_steps,
+    _TEXT: lambda value: isinstance(value, str),
+    _TEXTS: lambda value: isinstance(value, list) and all(map(_is_plain, value)),
+    _U: _is_u,
+    _SECONDS: _is_number,
+}

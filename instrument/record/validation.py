@@ -4,8 +4,8 @@ They cover the files, before SQLite opens them; the schema, which must be exactl
 of this program, since a view or a trigger would run code; and every value. The rules for values are
 part of the schema: `PRAGMA quick_check` verifies them where the tables have them, and queries here
 do so in older records. No schema can express the rules across rows, those for the outlines of
-previews and the encoding of texts; they are checked here, too. A row that is not as it was sealed
-is damaged: the record opens without it, unless nothing can replace it.
+previews, for choices of steps and for the encoding of texts; they are checked here, too. A row that
+is not as it was sealed is damaged: the record opens without it, unless nothing can replace it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ from itertools import chain
 from pathlib import Path
 
 from instrument.errors import InputError
+from instrument.record.event_kinds import CHOSEN
 from instrument.record.older_versions import OLDER_SQL
+from instrument.record.reading import Batch
 from instrument.record.schema import (
     FIRST_STRICT,
     SCHEMA_VERSION,
@@ -158,6 +160,7 @@ def check_values(database: sqlite3.Connection, path: Path, version: int) -> Dama
         _without_replacement(damaged),
         _too_many(database, damaged),
         _wrong_previews(database, damaged),
+        _wrong_choices(database, damaged),
     )
     for text in problems:
         raise InputError(f"{path}: {text}: {_ADVICE}")
@@ -212,6 +215,25 @@ def _wrong_previews(database: sqlite3.Connection, damaged: Damaged) -> Iterator[
     for step, outline in database.execute(f"SELECT step, polygon FROM {sound}"):
         if not _is_outline(outline):
             yield f"preview {step!r}: has no outline that can be read; allowed: JSON [[x, y], ...]"
+
+
+def _wrong_choices(database: sqlite3.Connection, damaged: Damaged) -> Iterator[str]:
+    """Yield what is wrong with the choices of a scan: their form, their order, a step twice."""
+    own = f"{_sound('event', damaged)} AND kind = ? ORDER BY rowid"
+    last, taken = -1, set[int]()
+    for row, text in database.execute(f"SELECT id, text FROM {own}", (CHOSEN,)):
+        try:
+            batch = Batch.of_text(text)
+        except ValueError as error:
+            yield f"event {row!r}: is no choice of steps: {str(error)[:200]}"
+            return
+        if batch.number <= last:
+            yield f"event {row!r}: batch {batch.number} after {last}; allowed: rising numbers"
+        if taken.intersection(batch.steps):
+            twice = min(taken.intersection(batch.steps))
+            yield f"event {row!r}: step {twice} is chosen twice; allowed: once"
+        last = batch.number
+        taken.update(batch.steps)
 
 
 def _is_outline(text: str) -> bool:

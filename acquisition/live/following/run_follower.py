@@ -19,6 +19,7 @@ from acquisition.live.following.run_reader import RunReader
 from acquisition.live.following.scan_end import ScanState, scan_state
 from acquisition.live.following.scan_watch import ScanWatch
 from acquisition.plan.plan import make_plan
+from acquisition.plan.recorded_choice import with_recorded_choice
 from acquisition.plan.step_count import StepCount
 from acquisition.results.reduction import reduced_rows
 from instrument.errors import GonioError
@@ -71,6 +72,8 @@ class RunFollower(Follower):
 
     def _put_rows(self, rows: Rows) -> None:
         reader, board = self._reader, self._board
+        if reader.loaded.protocol.goal is not None:
+            self._plan = with_recorded_choice(self._plan, rows.events)
         folder = str(reader.folder or reader.record_file.parent)
         content = run_content(reader.loaded, self._plan, self._curves, folder, reader.started_utc)
         board.put("run", "run", content)
@@ -88,7 +91,7 @@ class RunFollower(Follower):
 
     @property
     def _complete(self) -> bool:
-        return self._count.accepted == self._count.total
+        return self._count.accepted == self._count.total and not self._plan.growing
 
     def _state(self) -> ScanState:
         return scan_state(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from acquisition.engine.engine import Devices, Engine
 from acquisition.engine.resume import Progress
-from acquisition.plan.plan import Step, make_plan
+from acquisition.plan.plan import Plan, Step, make_plan
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded
 from instrument.record.reading import Reading
@@ -30,8 +30,12 @@ def scan(
     record: Record,
     upto: int | None = None,
     changed_devices: Callable[[Devices], Devices] = lambda devices: devices,
+    plan: Plan | None = None,
 ) -> None:
-    """Run, or resume what the record holds; end as if killed once step `upto` is on disk."""
+    """Run, or resume what the record holds; end as if killed once step `upto` is on disk.
+
+    plan: in place of that of the protocol.
+    """
 
     def on_step(step: Step) -> None:
         if step.index == upto:
@@ -39,7 +43,8 @@ def scan(
 
     devices = changed_devices(open_devices(loaded))
     before = Progress.of(record) if record.readings() else None
+    engine = Engine(loaded.protocol, loaded.rig, devices, record, on_step)
     try:
-        Engine(loaded.protocol, loaded.rig, devices, record, on_step).run(make_plan(loaded), before)
+        engine.run(plan or make_plan(loaded), before)
     except Cut:
         return

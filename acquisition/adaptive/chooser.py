@@ -1,0 +1,218 @@
+"""Choice of the next batch of an adaptive scan, from the readings of the batches before the last.
+
+The first two batches are spread over the candidates: nothing is known yet. Each later one follows
+from a fit of what was measured up to the last batch but one, so that it can be worked out while the
+last one is measured, and no choice depends on how long that takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from acquisition.adaptive.aims import Aims
+from acquisition.adaptive.knowledge import Knowledge
+from acquisition.adaptive.layout import Layout
+from acquisition.adaptive.next_points import Costs, NextPoints
+from acquisition.design.assumed_sample import AssumedSample
+from acquisition.design.forecast import forecast
+from acquisition.plan.plan import Step
+from analysis.design.optimal import LACK_OF_FIT
+from analysis.design.space_filling import farthest_from
+from analysis.models import MODELS
+from instrument.errors import InputError
+from instrument.geometry import BoolArray, Geometry
+from instrument.record.reading import Batch, Check, Reading
+
+FIRST, SECOND = 8, 4
+"""Points of the first two batches."""
+
+BATCH, PART = 4, 6
+"""Points of a later batch: at least so many, and at most one in so many of those before it."""
+
+_ENTRY = 4  # points of the first batch at another setting of the lamp by hand
+
+Chosen = list[tuple[Step, str]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """Points to measure next with their reasons, and what is known by then.
+
+    forecast: u of each parameter asked for, in its unit, once the batches before this one are
+    measured; floor: once every candidate is; empty where nothing can be told yet. sources: parts of
+    the variance that is left then, largest first, by parameter.
+    """
+
+    known: Knowledge = field(default_factory=Knowledge)
+    points: Chosen
+    forecast: Mapping[str, float | None] = field(default_factory=dict)
+    floor: Mapping[str, float | None] = field(default_factory=dict)
+    sources: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+
+class Chooser:
+    """Choice among the points of a list of candidates; it remembers nothing between two calls."""
+
+    def __init__(self, layout: Layout, aims: Aims) -> None:
+        self.layout, self.aims = layout, aims
+        self.points = layout.plan.points
+        poses = [step.pose for step in self.points]
+        self._geometry = Geometry.from_degrees(
+            theta_i=np.array([p.theta_i for p in poses]),
+            theta_r=np.array([p.theta_r for p in poses]),
+            dphi=np.array([p.dphi for p in poses]),
+        )
+        self._block = np.array([step.block for step in self.points])
+
+    def propose(
+        self, batches: Sequence[Batch], readings: Sequence[Reading], checks: Sequence[Check]
+    ) -> Proposal:
+        """Propose the batch after these; of the readings, those of the last one do not count."""
+        known_steps = self.steps(batches)
+        done = {step.index for step in known_steps}
+        chosen = np.array([step.index in done for step in self.points])
+        if len(batches) < 2:
+            count = FIRST if not batches else SECOND
+            return Proposal(points=self._spread(chosen, self._current(known_steps), count))
+        earlier = {step.index for step in self.steps(batches[:-1])}
+        seen = [reading for reading in readings if reading.step in earlier]
+        known = Knowledge.of(seen, checks, self.layout.loaded, self.aims)
+        measured = np.array([step.index in earlier for step in self.points])
+        size = max(BATCH, int(chosen.sum()) // PART)
+        if known.leading is not None:
+            try:
+                return self._informed(known, chosen, measured, known_steps, size)
+            except (InputError, ValueError):
+                pass  # the model found so far foretells no light at all: spread on
+        return Proposal(known=known, points=self._spread_on(chosen, known_steps, size))
+
+    def steps(self, batches: Sequence[Batch]) -> list[Step]:
+        """Return the steps of batches, in order."""
+        return [self.layout.plan.steps[index] for batch in batches for index in batch.steps]
+
+    @cached_property
+    def reachable(self) -> BoolArray:
+        """Mask (N,), without a unit, of the candidates to which a way leads, and back."""
+        return np.array([self.layout.reachable(step) for step in self.points])
+
+    def _current(self, known: Sequence[Step]) -> BoolArray:
+        """Candidates (N,) at the present setting of the lamp by hand."""
+        block = known[-1].block if known else self.layout.blocks()[0]
+        return self._at(block)
+
+    def _at(self, block: int) -> BoolArray:
+        """Candidates (N,) at one setting of the lamp by hand."""
+        return np.asarray(self.reachable & (self._block == block))
+
+    def _spread(self, chosen: BoolArray, allowed: BoolArray, count: int) -> Chosen:
+        """Return up to `count` candidates, each the farthest from those before it."""
+        found, so_far = list[int](), chosen.copy()
+        for _ in range(count):
+            point = farthest_from(self._geometry, so_far, allowed)
+            if point is None:
+                break
+            so_far[point] = True
+            found.append(point)
+        return [(self.points[k], LACK_OF_FIT) for k in found]
+
+    def _spread_on(self, chosen: BoolArray, known: Sequence[Step], size: int) -> Chosen:
+        """Return points at the present setting of the lamp by hand, else at the next one."""
+        here = self._current(known)
+        if np.any(here & ~chosen):
+            return self._spread(chosen, here, size)
+        for block in self._later(known):
+            found = self._spread(chosen, self._at(block), _ENTRY)
+            if found:
+                return found
+        return []
+
+    def _later(self, known: Sequence[Step]) -> list[int]:
+        begun = {step.block for step in known}
+        return [block for block in self.layout.blocks() if block not in begun]
+
+    def _informed(
+        self,
+        known: Knowledge,
+        chosen: BoolArray,
+        measured: BoolArray,
+        steps: Sequence[Step],
+        size: int,
+    ) -> Proposal:
+        leading, layout = known.leading, self.layout
+        if leading is None:
+            raise ValueError("no model to forecast with")
+        model = MODELS[leading.model]
+        x = np.array([leading.values[p.name] for p in model.parameters])
+        every = forecast(layout.loaded, layout.plan, AssumedSample(model, x, "the fit so far"))
+        used = every.used
+        costs = self._costs(steps, used)
+        choice = NextPoints(every, costs, chosen[used], known, self.aims)
+        by_design = choice.u(measured[used])
+        fitted = {name: leading.u.get(name) for name in self.aims.u}
+        # Errors that the fit sees beside those of the forecast stay in their ratio.
+        ratio = {
+            name: 1.0 if u is None else max(u / by_design[name], 1.0) for name, u in fitted.items()
+        }
+        floor = choice.u(np.ones(int(used.sum()), dtype=bool))
+        ahead = choice.u(chosen[used])
+        scale = {name: ratio[name] / self.aims.u[name] for name in self.aims.u}
+        points = self._best(choice, used, chosen, steps, size, scale)
+        return Proposal(
+            known=known,
+            points=points,
+            forecast={name: ratio[name] * u for name, u in ahead.items()},
+            floor={name: ratio[name] * u for name, u in floor.items()},
+            sources={name: every.sources(name) for name in self.aims.u},
+        )
+
+    def _best(
+        self,
+        choice: NextPoints,
+        used: BoolArray,
+        chosen: BoolArray,
+        steps: Sequence[Step],
+        size: int,
+        scale: Mapping[str, float],
+    ) -> Chosen:
+        """Return the best points here; those of a later setting by hand if they teach more."""
+        usable = np.flatnonzero(used)
+        here = (self._current(steps) & ~chosen)[used]
+        found, best = choice.pick(size, here, scale) if here.any() else ([], -1.0)
+        at = None
+        for block in self._later(steps):
+            allowed = self._at(block)[used]
+            if allowed.any():
+                picked, rate = choice.pick(size, allowed, scale)
+                if rate > best:
+                    found, best, at = picked, rate, block
+        if at is not None:  # begin there with points that show a lack of fit
+            return self._spread(chosen, self._at(at), _ENTRY)
+        return [(self.points[usable[k]], reason) for k, reason in found]
+
+    def _costs(self, known: Sequence[Step], used: BoolArray) -> Costs:
+        """Return the bench time of the candidates in `used` (N,), from the present pose."""
+        layout = self.layout
+        points = [step for step, kept in zip(self.points, used, strict=True) if kept]
+        numbers = [step.lamp_setting for step in points]
+        settings, own = np.unique(numbers, return_inverse=True)
+        firsts = {step.lamp_setting: step for step in reversed(points)}
+        here = known[-1].pose
+        way_s = np.zeros(settings.size)
+        for k, number in enumerate(settings.tolist()):
+            step = firsts[number]
+            lamp = step.pose._replace(theta_r=here.theta_r)
+            way_s[k] = min(layout.moves_s(here, lamp), layout.moves_s(here, step.pose))
+            if step.block != known[-1].block:  # the operator sets the lamp and places the tile
+                tiles = layout.batch([step], known)
+                way_s[k] = layout.seconds(tiles, known) - layout.frames_s(step)
+        camera_s = float(np.median([_camera_s(step) for step in self.points]))
+        point_s = camera_s + np.array([layout.frames_s(step) for step in points])
+        return Costs(point_s=point_s, way_s=way_s, setting=own.reshape(-1).astype(np.int64))
+
+
+def _camera_s(step: Step) -> float:
+    return sum(move.duration_s for move in step.moves if move.axis == "theta_r")

@@ -1,0 +1,70 @@
+"""Knowledge from the readings so far: a quick fit of the candidates, and the u that it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from acquisition.adaptive.aims import Aims
+from acquisition.results.fitting import fit_run, measurements
+from acquisition.results.reduction import reduced_rows
+from analysis.choice.choice import Choice, choose
+from analysis.fit.fit import FitResult
+from instrument.config.load import Loaded
+from instrument.errors import GonioError
+from instrument.record.reading import Check, Reading, Rows
+
+
+@dataclass(frozen=True, slots=True)
+class Knowledge:
+    """Choice of a model so far; `choice` is None where the readings are too few for any fit.
+
+    leading: the candidate that describes the data best among those with the parameters asked for.
+    """
+
+    choice: Choice | None = None
+    leading: FitResult | None = None
+
+    @classmethod
+    def of(
+        cls, readings: Sequence[Reading], checks: Sequence[Check], loaded: Loaded, aims: Aims
+    ) -> Knowledge:
+        """Fit the candidates quickly: models are not averaged over lamp and lens.
+
+        Checks at resumes count only where the lamp had jumped: else an interruption would change
+        the choices that follow it.
+        """
+        jumps = checks if any(check.jumped for check in checks) else ()
+        try:
+            m = measurements(reduced_rows(Rows(readings, jumps, ()), loaded), loaded)
+            choice = choose(m, None, aims.models, method=aims.method)
+        except (GonioError, ValueError):
+            return cls()  # too few, or all flagged: there is nothing to go by yet
+        able = [c for c in choice.candidates if set(aims.u) <= set(c.u) and c.converged]
+        chosen = [c for c in able if c.model == choice.chosen]
+        best = chosen[0] if chosen else min(able, key=lambda c: c.bic, default=None)
+        return cls(choice, best)
+
+    @property
+    def model(self) -> str:
+        """Name of the chosen model, empty without one."""
+        return "" if self.choice is None else self.choice.chosen or ""
+
+    @property
+    def verdict(self) -> str:
+        """The verdict on it, empty without a fit."""
+        return "" if self.choice is None else self.choice.verdict
+
+    def u(self, aims: Aims) -> dict[str, float | None]:
+        """Return the u of each parameter asked for; None where the chosen model gives none."""
+        best = None if self.choice is None else self.choice.best
+        return {name: None if best is None else best.u.get(name) for name in aims.u}
+
+
+def full_fit(rows: Rows, loaded: Loaded, aims: Aims) -> tuple[str, Mapping[str, float | None]]:
+    """Return the model that the run's own fit chooses, and the u that it will state."""
+    fitted = fit_run(reduced_rows(rows, loaded), loaded)
+    chosen = fitted.chosen
+    if chosen is None:
+        return "", dict.fromkeys(aims.u)
+    return chosen.model, {name: chosen.u.get(name) for name in aims.u}

@@ -1,0 +1,135 @@
+"""Scans without pictures: readings as predicted for a sample, with drawn errors of every kind.
+
+They have each error of the budget as large as it is stated, and shared as it is, so that a whole
+scan takes a hundredth of a second. The engine's part is small: it measures what a plan knows, and
+asks for more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.adaptive.candidate_list import candidate_list, with_goal
+from acquisition.adaptive.chooser import Chooser
+from acquisition.adaptive.course import chooser_of, chosen_while_measured
+from acquisition.design.predicted_readings import PredictedReadings
+from acquisition.plan.plan import Plan, Step, make_plan
+from acquisition.results.run_folder import run_meta
+from analysis.models import MODELS
+from instrument.config.load import Loaded
+from instrument.config.protocol import FitConfig
+from instrument.geometry import FloatArray, Geometry
+from instrument.record.reading import Reading
+from instrument.record.record import Record
+from tests.support.random_plans import base
+from tests.support.scans import TWO_MODELS, changed
+
+SAMPLE = ("oren_nayar+torrance_sparrow", {"albedo": 0.8, "sigma_deg": 20.0, "ks": 0.076})
+"""The demonstration's: sample D of the 1995 paper."""
+
+
+def adaptive_scan(
+    until: str,
+    budget_min: float | None = None,
+    *,
+    rig: str = "bench_12bit",
+    models: str | None = TWO_MODELS,
+    views: int = 17,
+    incidences: tuple[float, ...] = (30.0, 60.0),
+    **protocol: object,
+) -> Loaded:
+    """List of candidates of the demonstration with so many views at each incidence."""
+    sweep = {
+        "theta_i_deg": list(incidences),
+        "dphi_deg": [0.0],
+        "theta_r_deg": np.linspace(-80, 80, views).tolist(),
+    }
+    fit = FitConfig(models=None if models is None else models.split(", "))
+    loaded = changed(base(rig), sweeps=[sweep], fit=fit, **protocol)
+    return candidate_list(with_goal(loaded, until, budget_min))
+
+
+class PredictedBench:
+    """Bench that measures the steps of a list of candidates; `seed`: of all its errors."""
+
+    def __init__(
+        self,
+        loaded: Loaded,
+        seed: int = 0,
+        sample: tuple[str, Mapping[str, float]] = SAMPLE,
+        chooser: Chooser | None = None,
+    ) -> None:
+        self.loaded, self._seed = loaded, seed
+        self.plan = make_plan(loaded)
+        self.chooser = chooser or chooser_of(loaded, self.plan)
+        self._model, self._parameters = MODELS[sample[0]], dict(sample[1])
+        predicted = PredictedReadings(loaded, self._brdf).of(self.plan)
+        self._readings = [self._drawn(reading) for reading in predicted]
+
+    def create(self, folder: Path) -> Record:
+        """Create the record of a run, as `gonio run` does."""
+        return Record.create(folder, run_meta(self.loaded, self.plan))
+
+    def run(self, record: Record, upto: int | None = None) -> Plan:
+        """Measure, or go on with, a run; end as if killed once the record has `upto` readings."""
+        plan = chosen_while_measured(self.chooser, record)
+        done = {reading.step for reading in record.readings()}
+        steps = [step for step in plan.known if step.index not in done]
+        while steps or plan.growing:
+            for step in steps:
+                if len(record.readings()) == upto:
+                    return plan
+                record.add_reading(self.reading(step, record))
+            steps = list(plan.more())
+        record.set_meta("steps", str(len(plan.known)))
+        return plan
+
+    def reading(self, step: Step, record: Record) -> Reading:
+        """Return the reading of a step, at the time when the scan comes to it."""
+        made = max(record.readings(), key=lambda r: r.time_s, default=None)
+        begun_s, before = (0.0, []) if made is None else (made.free_s, [self.plan.steps[made.step]])
+        end_s = begun_s + self.chooser.layout.seconds([step], before)
+        return replace(self._readings[step.index], time_s=end_s, free_s=end_s)
+
+    def _brdf(self, geometry: Geometry) -> FloatArray:
+        return np.asarray(self._model.brdf(geometry, **self._parameters))
+
+    def _random(self, *key: object) -> float:
+        """Return a draw of a standard normal distribution for a key, the same each time."""
+        words = [self._seed, *repr(key).encode()]
+        return float(np.random.default_rng(words).standard_normal())
+
+    def _drawn(self, r: Reading) -> Reading:
+        own = [r.u_noise_dn, r.u_quantisation_dn, r.u_texture_dn]
+        signal = r.signal_dn * self._by_angles(r) * self._by_tile(r)
+        signal += sum(u * self._random("own", r.step, n) for n, u in enumerate(own))
+        signal += r.u_dark_dn * self._random("dark", r.exposure_s)
+        signal += r.u_placement_dn * self._random("placement", r.surface)
+        return replace(r, signal_dn=float(signal))
+
+    def _by_angles(self, r: Reading) -> float:
+        """Factor on a reading by the errors of the axes, which depend on the angle alone."""
+        axes = self.loaded.rig.axes
+        off_i = axes.theta_i.u_deg * self._random("theta_i", r.theta_i_deg)
+        off_r = axes.theta_r.u_deg * self._random("theta_r", r.theta_r_deg)
+        lit = np.cos(np.radians(r.theta_i_deg + off_i)) / np.cos(np.radians(r.theta_i_deg))
+        if r.surface != "sample":
+            return float(lit)
+        there, here = (
+            self._brdf(Geometry.from_degrees(theta_i=i, theta_r=t, dphi=r.dphi_deg))
+            for i, t in (
+                (r.theta_i_deg + off_i, r.theta_r_deg + off_r),
+                (r.theta_i_deg, r.theta_r_deg),
+            )
+        )
+        return float(lit * there / here)
+
+    def _by_tile(self, r: Reading) -> float:
+        tile = self.loaded.protocol.references.white_tile
+        if r.kind != "tile" or tile is None or tile.reflectance is None:
+            return 1.0
+        return 1 + (tile.u_reflectance or 0.0) / tile.reflectance * self._random("certificate")
