@@ -35,6 +35,13 @@ class HandSetAxis:
         """Return the tolerance of a setting."""
         return {"tolerance_deg": f"{self._tolerance_deg:g}"}
 
+    def set_speed(self, speed_deg_per_s: float) -> None:
+        """Refuse: nobody turns a scale at a steady speed."""
+        raise DeviceError(
+            f"{self._name} is set by hand and cannot turn at {speed_deg_per_s:g} deg/s: measure "
+            "with motion: stepped"
+        )
+
     def start_move(self, angle_deg: float) -> None:
         """Ask the operator to set an angle in degrees until the answer is within tolerance."""
         text = f"Set {self._words} ({self._name}) to {angle_deg:g} degrees"

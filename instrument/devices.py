@@ -74,6 +74,9 @@ class Stage(Protocol):
     def settings(self) -> dict[str, str]:
         """Return settings by name, read back from the device if possible; units in the names."""
 
+    def set_speed(self, speed_deg_per_s: float) -> None:
+        """Let later moves turn at this speed, up to that of the rig file; the axis must rest."""
+
     def start_move(self, angle_deg: float) -> None:
         """Start a move to `angle_deg` and return at once."""
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from instrument.errors import DeviceError
 from instrument.kinematics import Trapezoid
 
+_ROUNDING = 1e-9
 STARTS_WITHIN_S = 0.5  # some controllers still report ready just after the command
 STALLED_S = 1.0  # reported as moving, but at the same position
 LONG_S = 1.0  # moves of this duration show whether the controller's speed is the rig file's
@@ -29,6 +31,26 @@ class Limits:
     tolerance_deg: float
     homing_s: float
     home_deg: float = 0.0
+
+    def at_speed(self, name: str, speed_deg_per_s: float) -> Limits:
+        """Return the limits of moves at a speed; raise `DeviceError` above that of these."""
+        full = self.speed_deg_per_s
+        if not 0 < speed_deg_per_s <= full * (1 + _ROUNDING):
+            raise DeviceError(
+                f"{name}: {speed_deg_per_s:g} deg/s asked for; allowed: more than 0, up to "
+                f"{full:g} deg/s, the rig file's"
+            )
+        return replace(self, speed_deg_per_s=speed_deg_per_s)
+
+
+def require_within(name: str, angle_deg: float, limits_deg: tuple[float, float]) -> None:
+    """Raise `DeviceError` for an angle past limits, the lower one first; no angle is clipped."""
+    low, high = limits_deg
+    if not low - _ROUNDING <= angle_deg <= high + _ROUNDING:
+        raise DeviceError(
+            f"{name}: {angle_deg:g} deg asked for; its limits are {low:g} to {high:g} deg (the "
+            "device's own degrees): nothing has moved"
+        )
 
 
 @dataclass(frozen=True, slots=True)

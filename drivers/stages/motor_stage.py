@@ -19,6 +19,7 @@ from drivers.stages.motion import (
     Monitor,
     MoveMonitor,
     Status,
+    require_within,
 )
 from drivers.stages.stopping import VerifiedStop
 from drivers.stages.watchdog import Watchdog
@@ -30,7 +31,6 @@ from instrument.errors import ComputerPaused, DeviceError
 log = logging.getLogger(__name__)
 
 POLL_S = 0.005
-_ROUNDING_DEG = 1e-9
 
 
 class Stopped(DeviceError):
@@ -55,6 +55,7 @@ class MotorStage(ABC):
         reply_s: float = REPLY_S,
     ) -> None:
         self.name, self._limits, self._clock, self._line = name, limits, clock, line
+        self._rig_limits = limits
         self._target_deg: float | None = None
         self._motion: Monitor | None = None
         self._stopped = self._speed_known = False
@@ -169,7 +170,7 @@ class MotorStage(ABC):
 
     def home(self) -> None:
         """Find the reference and stop at home; a controller that keeps its reference only moves."""
-        now = self._status_before_motion()
+        now, self._limits = self._status_before_motion(), self._rig_limits
         self._refuse_fault(now)
         if now.homed and self.KEEPS_REFERENCE:
             self._set_speed()
@@ -183,6 +184,13 @@ class MotorStage(ABC):
         self._apply_speed()
         self._speed_known = False  # what is read back need not be what is done
 
+    def set_speed(self, speed_deg_per_s: float) -> None:
+        """Let later moves turn at this speed, at most the rig file's; refused during a motion."""
+        slower = self._rig_limits.at_speed(self.name, speed_deg_per_s)
+        self._refuse_fault(self._status_before_motion())
+        self._limits = slower
+        self._set_speed()
+
     def _find_reference(self, again: bool) -> None:
         self._target_deg = None
         self._begin(HomingMonitor(self._limits.homing_s, self._clock.now_s(), again))
@@ -195,7 +203,7 @@ class MotorStage(ABC):
 
         Before homing, past a limit and while there is a fault it is refused and nothing is sent.
         """
-        self._refuse_beyond_limits(angle_deg)
+        require_within(self.name, angle_deg, self.limits_deg())
         now = self._status_before_motion()
         self._refuse_fault(now)
         if not now.homed:
@@ -373,14 +381,6 @@ class MotorStage(ABC):
             self._stop_or_report()  # the first stop may have come before the command
             self._raise_if_unwatched()
             raise Stopped(f"{self.name}: stopped as it was about to move")
-
-    def _refuse_beyond_limits(self, angle_deg: float) -> None:
-        low, high = self.limits_deg()
-        if not low - _ROUNDING_DEG <= angle_deg <= high + _ROUNDING_DEG:
-            raise DeviceError(
-                f"{self.name}: {angle_deg:g} deg asked for; its limits are {low:g} to {high:g} deg "
-                "(the device's own degrees): nothing has moved"
-            )
 
     def _refuse_lost_reference(self, now: Status) -> None:
         """Raise if the reference was lost: a controller that was without power has no position."""

@@ -8,7 +8,7 @@ matters only here, in `acquisition.rig`, and in the two modules that handle ever
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
 
@@ -37,6 +37,9 @@ Port = Annotated[
 
 
 class _Axis(Section):
+    reports_while_moving: ClassVar[bool] = False
+    """True for a driver that turns at a given speed and reports positions on the way."""
+
     min_deg: Finite
     max_deg: Finite
     zero_deg: Finite = 0.0
@@ -86,6 +89,8 @@ class _MotorAxis(_Axis):
 
     After homing, which takes up to `homing_s`, the axis is at `home_deg`.
     """
+
+    reports_while_moving: ClassVar[bool] = True
 
     speed_deg_per_s: Positive
     acceleration_deg_per_s2: Positive

@@ -12,8 +12,10 @@ import shutil
 import sys
 import tempfile
 import threading
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import assert_never
 
@@ -107,19 +109,31 @@ class EmulatedBench:
 
         def render(exposure: Exposure, snapshot: object) -> Image:
             with lock:
-                if isinstance(snapshot, Scene):
-                    sensor.scene = snapshot
-                return sensor.picture(exposure.exposure_s)
+                exposure_s = exposure.exposure_s
+                if not isinstance(snapshot, Scene):
+                    return sensor.picture(exposure_s)
+                sensor.scene = snapshot
+                poses = snapshot.poses_during(exposure.start_s, exposure_s)
+                return sensor.picture(exposure_s, poses)
 
         capabilities = _capabilities(camera, self._scene.rig.simulation.camera_defects)
         return EmulatedCamera(render, self._snapshot, capabilities)
 
     def _snapshot(self) -> Scene:
-        """Copy of the scene at the start of an exposure, with the motors' present angles."""
-        scene = self._scene
+        """Copy of the scene at the start of an exposure, with the motors' angles and motions."""
+        scene, motions = self._scene, dict[str, Callable[[float], float]]()
         for name, motor in self.motors.items():
-            scene.set_axis(name, scene.rig.axes[name].from_device_deg(motor.position_deg))
-        return replace(scene, true_deg=dict(scene.true_deg))
+            axis = scene.rig.axes[name]
+            scene.set_axis(name, axis.from_device_deg(motor.position_deg))
+            if (motion := motor.motion()) is not None:
+                motions[name] = partial(_rig_angle_deg, axis.from_device_deg, motion)
+        return replace(scene, true_deg=dict(scene.true_deg), motions=motions)
+
+
+def _rig_angle_deg(
+    from_device_deg: Callable[[float], float], motion: Callable[[float], float], time_s: float
+) -> float:
+    return from_device_deg(motion(time_s))
 
 
 def _controller(axis: Wired, motor: Motor) -> Controller:

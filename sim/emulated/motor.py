@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from instrument.clock import Clock
@@ -64,6 +65,14 @@ class Motor:
                 return True
             held = self._held_deg is not None and self._move.distance_deg != 0
             return held or self._clock.now_s() - self._start_s < self._move.duration_s
+
+    def motion(self) -> Callable[[float], float] | None:
+        """Position in degrees by the clock's time, of the move under way; None without one."""
+        with self._lock:
+            if self.homing or self._held_deg is not None or not self.moving:
+                return None
+            start_deg, move, start_s = self._start_deg, self._move, self._start_s
+        return lambda time_s: start_deg + move.travelled_deg(time_s - start_s)
 
     def home(self) -> None:
         """Start searching for the reference."""

@@ -94,6 +94,12 @@ class FaultyStage(FaultyDevice[Stage]):
         with self._call("settings"):
             return self._device.settings()
 
+    def set_speed(self, speed_deg_per_s: float) -> None:
+        """Set the speed of later moves."""
+        with self._call("set_speed"):
+            self._require_reference()
+            self._device.set_speed(speed_deg_per_s)
+
     def start_move(self, angle_deg: float) -> None:
         """Start a move."""
         with self._call("start_move"):
@@ -167,6 +173,7 @@ class FaultyStage(FaultyDevice[Stage]):
         if self._offset_deg:
             device_deg = self._device.position_deg() + self._offset_deg
             self._scene.set_axis(self._name, self._axis.from_device_deg(device_deg))
+            self._scene.push(self._name, self._axis.sign * self._offset_deg)
 
 
 class FaultyCamera(FaultyDevice[Camera]):

@@ -50,8 +50,10 @@ class SimulatedCamera:
         world = self._scene.world
         set_s = self._set_s * world.control
         exposure_s = true_exposure_s(set_s, self._defects) * world.exposure
+        begin_s = self._clock.now_s() + self._settings.frame_overhead_s
         self._clock.sleep(self._settings.frame_overhead_s + exposure_s / 2)
-        image = self._sensor.picture(exposure_s)  # in the middle: the mean of a drifting lamp
+        # In the middle: the mean of a drifting lamp.
+        image = self._sensor.picture(exposure_s, self._scene.poses_during(begin_s, exposure_s))
         self._clock.sleep(exposure_s / 2)
         taken = limit_range(image, self._defects)
         return Frame(taken, read_back_s(set_s, self._defects), self._clock.now_s())

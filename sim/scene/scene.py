@@ -10,6 +10,7 @@ ran in one go or was resumed.
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import get_args
 
@@ -53,6 +54,8 @@ from sim.defects.world import SOUND, World
 _UNSET_DEG = {"theta_i": 30.0, "dphi": 0.0, "theta_r": 0.0}
 
 
+_NODES = -(0.6**0.5), 0.0, 0.6**0.5  # Gauss-Legendre, of an exposure from -1 to 1
+NODE_WEIGHTS = 5 / 18, 8 / 18, 5 / 18
 BOARD_PLACES = get_args(BoardPlace)
 PAPER = 0.8  # reflectance of white paper (assumed)
 
@@ -71,8 +74,8 @@ class Scene:
     error. clock: by which the lamp drifts. rings: see `sim.scene.render`; cache of the averaging
     needed for each place of the lamp. heights_mm: height of each surface above the rotation axis;
     that of the tile is drawn from the rig's uncertainty of placement; a board lies as the sample
-    does. world: faults that no device reports. board: that which the operator may put there.
-    markers: on the plate of the sample.
+    does. motions: angle of each axis that moves, by the clock's time. world: faults that no device
+    reports. board: that which the operator may put there. markers: on the plate of the sample.
     """
 
     rig: Rig
@@ -85,6 +88,7 @@ class Scene:
     step: int = 0
     clock: Clock = field(default_factory=SimulatedClock)
     true_deg: dict[str, float] = field(default_factory=dict)
+    motions: dict[str, Callable[[float], float]] = field(default_factory=dict)
     rings: dict[tuple[str, float, float], IntArray] = field(default_factory=dict)
     world: World = SOUND
     board: Board = field(default_factory=Board)
@@ -148,12 +152,50 @@ class Scene:
         The error has the axis's standard uncertainty and depends on the angle only, like the
         cyclic error of a real stage: returning to an angle gives the same true angle.
         """
-        u_deg = self.rig.axes[axis].u_deg
+        error_deg = self._random_error_deg(axis, angle_deg) + self._lasting_deg(axis, angle_deg)
+        self.true_deg[axis] = float(angle_deg + error_deg)
+
+    def _random_error_deg(self, axis: str, angle_deg: float) -> float:
         key = round(angle_deg * 1e4) % 2**32
-        error_deg = u_deg * self.random(stream_key(axis), key).standard_normal()
+        drawn = self.random(stream_key(axis), key).standard_normal()
+        return float(self.rig.axes[axis].u_deg * drawn)
+
+    def _lasting_deg(self, axis: str, angle_deg: float) -> float:
         phase = float(self.random(stream_key(f"cycle of {axis}")).random())
-        lasting_deg = axis_error_deg(angle_deg, self.rig.simulation.axis_defects[axis], phase)
-        self.true_deg[axis] = float(angle_deg + error_deg + lasting_deg)
+        return axis_error_deg(angle_deg, self.rig.simulation.axis_defects[axis], phase)
+
+    def push(self, axis: str, by_deg: float) -> None:
+        """Turn an axis that moves by `by_deg` beyond what its motor does."""
+        motion = self.motions.get(axis)
+        if motion is not None:
+            self.motions[axis] = lambda time_s: motion(time_s) + by_deg
+
+    def poses_during(self, begin_s: float, exposure_s: float) -> tuple[dict[str, float], ...]:
+        """Return the true angles at the nodes of an exposure; one pose where nothing moves.
+
+        begin_s: by the clock. The mean over the nodes is that over the exposure, exact for
+        polynomials up to degree 5 (Gauss-Legendre).
+        """
+        if not self.motions:
+            return (self.true_deg,)
+        times_s = [begin_s + exposure_s * (1 + node) / 2 for node in _NODES]
+        return tuple(self.true_deg | self._moving_deg(time_s) for time_s in times_s)
+
+    def _moving_deg(self, time_s: float) -> dict[str, float]:
+        """Return the true angles of the axes that move.
+
+        The random errors vary smoothly from one whole degree, where they are those of an axis at
+        rest, to the next.
+        """
+        true_deg = {}
+        for axis, motion in self.motions.items():
+            angle_deg = motion(time_s)
+            low_deg = float(np.floor(angle_deg))
+            share = angle_deg - low_deg
+            ends = [self._random_error_deg(axis, low_deg + n) for n in (0.0, 1.0)]
+            error_deg = float(np.dot([1 - share, share], ends) / np.hypot(1 - share, share))
+            true_deg[axis] = angle_deg + error_deg + self._lasting_deg(axis, angle_deg)
+        return true_deg
 
     @property
     def mounted(self) -> Surface | BoardPlace | None:

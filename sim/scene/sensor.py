@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
@@ -18,7 +20,7 @@ from sim.defects.camera import (
 from sim.defects.picture import distorted, mixed_up, stray_electrons_per_s
 from sim.defects.world import SOUND
 from sim.scene.render import FloatImage, electrons_per_s
-from sim.scene.scene import Scene, stream_key
+from sim.scene.scene import NODE_WEIGHTS, Scene, stream_key
 
 _SceneState = tuple[object, ...]  # surface, true angles and faults: all that an image depends on
 
@@ -48,6 +50,7 @@ class Sensor:
         self._responses = unequal_responses(shape, defects, prnu)
         self._darks_electrons = unequal_darks_electrons(shape, defects, dsnu)
         self._light_state: _SceneState = ()
+        self._poses: tuple[dict[str, float], ...] = ()
         self._light = self._no_light = np.zeros(shape, np.float32)
         self._expected_key: tuple[_SceneState, float, float, float] = ((), 0.0, 0.0, 0.0)
         self._expected = (self._light, self._light)
@@ -55,12 +58,15 @@ class Sensor:
         self._counts = np.empty(shape, np.uint16)
         self._last: Image | None = None
 
-    def picture(self, exposure_s: float) -> Image:
+    def picture(self, exposure_s: float, poses: Sequence[dict[str, float]] = ()) -> Image:
         """Return an image of the scene in its present state, (height, width) in counts.
+
+        poses: true angles of the axes, over which the light is averaged; the present ones if empty.
 
         The expected counts are reused while scene, exposure and lamp level (to 1e-6) stay the same.
         """
         self._count_frame(exposure_s)
+        self._poses = tuple(poses) or (self.scene.true_deg,)
         world, settings = self.scene.world, self._settings
         mean, spread = self._mean_and_spread_dn(exposure_s)
         noise = self._standard_normal()
@@ -83,7 +89,8 @@ class Sensor:
         """Expected counts of each pixel and their standard deviation, before rounding."""
         scene = self.scene
         level = round(scene.lamp_level(), 6) * scene.world.light(scene.lit) * self._flicker()
-        state = (scene.surface, *sorted(scene.true_deg.items()), scene.world)
+        angles = (tuple(sorted(pose.items())) for pose in self._poses)
+        state = (scene.surface, *angles, scene.world)
         warmth = round(dark_current_factor(scene.age_s(), self._defects), 4)
         key = (state, exposure_s, level, warmth)
         if key != self._expected_key:
@@ -95,8 +102,18 @@ class Sensor:
     def _light_of(self, state: _SceneState) -> FloatImage:
         """Electrons per second at lamp level 1."""
         if state != self._light_state:
-            self._light, self._light_state = electrons_per_s(self.scene), state
+            lights = [self._light_at(pose) for pose in self._poses]
+            self._light = lights[0] if len(lights) == 1 else _mean_of(lights)
+            self._light_state = state
         return self._light
+
+    def _light_at(self, pose: dict[str, float]) -> FloatImage:
+        scene, own = self.scene, self.scene.true_deg
+        scene.true_deg = pose
+        try:
+            return electrons_per_s(scene)
+        finally:
+            scene.true_deg = own
 
     def _expected_dn(
         self, light: FloatImage, level: float, exposure_s: float, warmth: float
@@ -146,3 +163,11 @@ class Sensor:
         cv2.setRNGSeed(int(np.random.SeedSequence(key).generate_state(1)[0] >> 1))
         cv2.randn(self._noise, np.zeros(1), np.ones(1))
         return self._noise
+
+
+def _mean_of(lights: Sequence[FloatImage]) -> FloatImage:
+    """Mean over an exposure of the light at its nodes, (height, width) each."""
+    mean = np.zeros_like(lights[0])
+    for weight, light in zip(NODE_WEIGHTS, lights, strict=True):
+        mean += np.float32(weight) * light
+    return mean

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from instrument.clock import Clock
 from instrument.config.axes import SimulatedAxis
 from instrument.errors import DeviceError
@@ -14,7 +16,8 @@ class SimulatedStage:
 
     def __init__(self, name: str, axis: SimulatedAxis, scene: Scene, clock: Clock) -> None:
         self._name, self._axis, self._scene, self._clock = name, axis, scene, clock
-        self._homed = False
+        self._homed, self._speed_deg_per_s = False, axis.speed_deg_per_s
+        self._latency_s = scene.rig.simulation.axis_defects[name].latency_s
         self._start_deg = axis.zero_deg
         self._move = self._trapezoid(0.0)
         self._start_s = 0.0
@@ -26,7 +29,7 @@ class SimulatedStage:
     def home(self) -> None:
         """Find the reference."""
         self._clock.sleep(self._axis.homing_s)
-        self._homed = True
+        self._homed, self._speed_deg_per_s = True, self._axis.speed_deg_per_s
         self._start_deg = self._axis.to_device_deg(self._axis.home_deg)
         self._move = self._trapezoid(0.0)
         self._write_scene()
@@ -45,6 +48,16 @@ class SimulatedStage:
             "acceleration_deg_per_s2": f"{axis.acceleration_deg_per_s2:g}",
         }
 
+    def set_speed(self, speed_deg_per_s: float) -> None:
+        """Set the speed of later moves; raise `DeviceError` above the rig file's."""
+        full = self._axis.speed_deg_per_s
+        if not 0 < speed_deg_per_s <= full * (1 + 1e-9):
+            raise DeviceError(
+                f"stage {self._name}: {speed_deg_per_s:g} deg/s asked for; allowed: more than 0, "
+                f"up to {full:g} deg/s, the rig file's"
+            )
+        self._speed_deg_per_s = speed_deg_per_s
+
     def start_move(self, angle_deg: float) -> None:
         """Start a move; raise `DeviceError` if not homed or beyond the rig file's limits."""
         if not self._homed:
@@ -55,9 +68,11 @@ class SimulatedStage:
                 f"stage {self._name}: {angle_deg:g} deg asked for; its limits are {low:g} to "
                 f"{high:g} deg (in device degrees): nothing has moved"
             )
-        self._start_deg = self.position_deg()
+        now_s = self._clock.now_s()
+        self._start_deg = self._at_deg(now_s)
         self._move = self._trapezoid(angle_deg - self._start_deg)
-        self._start_s = self._clock.now_s()
+        self._start_s = now_s
+        self._scene.motions[self._name] = self._motion()
 
     def wait(self) -> float:
         """Let the move finish and return the position in degrees."""
@@ -65,8 +80,8 @@ class SimulatedStage:
         return self._halt()
 
     def position_deg(self) -> float:
-        """Return the current position, also during a move."""
-        return self._start_deg + self._move.travelled_deg(self._clock.now_s() - self._start_s)
+        """Return the position, also during a move: of `latency_s` ago, as the rig file says."""
+        return self._at_deg(self._clock.now_s() - self._latency_s)
 
     def limits_deg(self) -> tuple[float, float]:
         """Return the rig file's limits in device degrees."""
@@ -87,14 +102,23 @@ class SimulatedStage:
         """Do nothing: there is nothing to release."""
 
     def _halt(self) -> float:
-        self._start_deg = self.position_deg()
+        self._start_deg = self._at_deg(self._clock.now_s())
         self._move = self._trapezoid(0.0)
         self._write_scene()
         return self._start_deg
 
+    def _at_deg(self, time_s: float) -> float:
+        return self._start_deg + self._move.travelled_deg(time_s - self._start_s)
+
+    def _motion(self) -> Callable[[float], float]:
+        """Return the angle of the rig at a time of the clock, for the move that has begun."""
+        start_deg, move, start_s = self._start_deg, self._move, self._start_s
+        convert = self._axis.from_device_deg
+        return lambda time_s: convert(start_deg + move.travelled_deg(time_s - start_s))
+
     def _trapezoid(self, distance_deg: float) -> Trapezoid:
-        axis = self._axis
-        return Trapezoid(distance_deg, axis.speed_deg_per_s, axis.acceleration_deg_per_s2)
+        return Trapezoid(distance_deg, self._speed_deg_per_s, self._axis.acceleration_deg_per_s2)
 
     def _write_scene(self) -> None:
+        self._scene.motions.pop(self._name, None)
         self._scene.set_axis(self._name, self._axis.from_device_deg(self._start_deg))

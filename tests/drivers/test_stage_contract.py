@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+import numpy as np
 import pytest
 
 from drivers.factory import Lines, open_stage
 from drivers.lines.serial_line import PortGone
-from instrument.clock import SystemClock
+from instrument.clock import Clock, SystemClock
 from instrument.config.axes import AXES, SimulatedAxis, Wired
 from instrument.config.load import load_protocol, load_rig
 from instrument.devices import Stage
@@ -33,11 +34,13 @@ REACH_DEG = 10.0  # how far from home a real stage is moved
 
 @dataclass(frozen=True)
 class StageUnderTest:
-    """A stage, where its home is, and how far from its target it may stop."""
+    """A stage, where its home is, how far from its target it may stop, and its full speed."""
 
     stage: Stage
     home_deg: float
     tolerance_deg: float
+    full_deg_per_s: float
+    clock: Clock = field(default_factory=SystemClock)
 
     def at(self, share: float) -> float:
         """Return an angle at a share of the reach on the side of home that has more room."""
@@ -60,8 +63,11 @@ def simulated() -> Iterator[StageUnderTest]:
     axis = loaded.rig.axes.theta_r
     assert isinstance(axis, SimulatedAxis)
     scene = Scene.of(loaded.rig, loaded.protocol)
-    stage = SimulatedStage("theta_r", axis, scene, SimulatedClock())
-    yield StageUnderTest(stage, axis.to_device_deg(axis.home_deg), 0.05)  # it has errors of its own
+    clock = SimulatedClock()
+    stage = SimulatedStage("theta_r", axis, scene, clock)
+    home_deg = axis.to_device_deg(axis.home_deg)
+    # It has errors of its own.
+    yield StageUnderTest(stage, home_deg, 0.05, axis.speed_deg_per_s, clock)
 
 
 @contextmanager
@@ -72,7 +78,8 @@ def real(name: str, config: pytest.Config) -> Iterator[StageUnderTest]:
     with Lines(SystemClock()) as lines:
         stage = open_stage(name, axis, axis.port, lines)
         try:
-            yield StageUnderTest(stage, axis.to_device_deg(axis.home_deg), axis.tolerance_deg)
+            home_deg = axis.to_device_deg(axis.home_deg)
+            yield StageUnderTest(stage, home_deg, axis.tolerance_deg, axis.speed_deg_per_s)
         finally:
             try:
                 stage.stop()
@@ -116,7 +123,8 @@ def tested(request: pytest.FixtureRequest) -> Iterator[StageUnderTest]:
             yield tested
     else:
         with EMULATED_STAGES[request.param]() as emulated:
-            yield StageUnderTest(emulated.stage, LIMITS.home_deg, LIMITS.tolerance_deg)
+            full = LIMITS.speed_deg_per_s
+            yield StageUnderTest(emulated.stage, LIMITS.home_deg, LIMITS.tolerance_deg, full)
 
 
 def test_identity_is_stable(tested: StageUnderTest) -> None:
@@ -177,6 +185,40 @@ def test_a_stop_ends_a_move_before_its_target(tested: StageUnderTest) -> None:
     assert abs(where - tested.home_deg) < abs(tested.at(0.9) - tested.home_deg)
     stage.start_move(tested.at(0.1))  # the next move is possible
     assert stage.wait() == tested.near(tested.at(0.1))
+
+
+def test_positions_during_a_move_at_a_set_speed_lie_on_one_line(tested: StageUnderTest) -> None:
+    """What a scan with `motion: fly` relies on: each position is of a time within its exchange."""
+    stage, clock, speed = tested.homed(), tested.clock, min(20.0, tested.full_deg_per_s / 4)
+    stage.set_speed(speed)
+    target_deg = tested.at(0.9)
+    way_deg, seen = target_deg - tested.home_deg, []
+    stage.start_move(target_deg)
+    until_s = clock.now_s() + 2 * abs(way_deg) / speed + 2.0
+    while clock.now_s() < until_s:
+        before_s = clock.now_s()
+        share = (stage.position_deg() - tested.home_deg) / way_deg
+        seen.append((before_s, clock.now_s(), share))
+        if share > 0.9:
+            break
+        clock.sleep(0.005)
+    assert stage.wait() == tested.near(target_deg)
+    steady = [one for one in seen if 0.2 < one[2] < 0.8]  # away from both ramps
+    assert len(steady) >= 5
+    before_s, after_s, shares = np.array(steady).T
+    turned_deg = abs(way_deg) * shares
+    assert np.max(turned_deg - speed * after_s) <= np.min(turned_deg - speed * before_s) + 0.1
+    stage.set_speed(tested.full_deg_per_s)
+
+
+def test_a_speed_beyond_the_rig_file_s_is_refused(tested: StageUnderTest) -> None:
+    stage, full = tested.homed(), tested.full_deg_per_s
+    for speed in (0.0, -1.0, 1.01 * full, float("nan")):
+        with pytest.raises(DeviceError, match=r"deg/s asked for; allowed: more than 0, up to"):
+            stage.set_speed(speed)
+    stage.set_speed(full)
+    stage.start_move(tested.at(0.2))
+    assert stage.wait() == tested.near(tested.at(0.2))
 
 
 def test_waiting_without_a_move_returns_the_position(tested: StageUnderTest) -> None:

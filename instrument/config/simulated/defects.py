@@ -75,11 +75,13 @@ class AxisDefects(Section):
     """Axis whose true angle is not the one that it shows.
 
     `zero_deg`: true angle minus the one shown, at each angle. `cyclic_deg`: amplitude of an error
-    that goes through one period per turn; its phase is drawn from the seed.
+    that goes through one period per turn; its phase is drawn from the seed. `latency_s`: age of the
+    position that it reports while it moves, relative to the time stamps of the frames.
     """
 
     zero_deg: Annotated[float, Field(ge=-10, le=10), Spread.SIGNED] = 0.0
     cyclic_deg: Annotated[float, Field(ge=0, le=10), Spread.SIZE] = 0.0
+    latency_s: Annotated[float, Field(ge=-0.2, le=0.2)] = 0.0
 
 
 class BeamDefects(AxisDefects):
