@@ -10,6 +10,7 @@ DRIFT: Final = "drift"  # a drift check at a resume, and its outcome
 RETRY: Final = "retry"  # a warning of a driver: an exchange was repeated, a frame discarded
 TROUBLE: Final = "trouble"  # an error of a driver that did not end the scan
 EXPOSURE: Final = "exposure"  # counts at two exposures, compared
+LATENCY: Final = "latency"  # between camera and axis, found for frames of an axis that turns
 HOT: Final = "hot pixels"  # left out of the window's mean, with their positions
 PLATE: Final = "plate"  # where markers show the plate that carries the sample
 INTERLOCK: Final = "interlock"  # a measurement contradicts the physics: what was done about it

@@ -32,6 +32,10 @@ class Reading:
     and patch if the lens scattered all light of the picture near by, farther and far, see
     `acquisition.measure.stray_light`. All are 0 without a patch. Stray light is in `signal_dn`.
     `lamp_setting` counts the positions of the lamp, `block` the times that it was set by hand.
+    `blur_deg`: by how much theta_r turned during the exposure, 0 at rest; `theta_r_deg` is the mean
+    over it, `u_turn_deg` its standard uncertainty by the time stamps, and `u_latency_deg` (signed:
+    the directions of turning have opposite signs) that by the latency between camera and axis,
+    which all readings of one exposure share.
     `time_s` is the scan time at the middle of the frames, without interruptions of the scan;
     `free_s` is the time at which the rig could move on, the dark having been taken.
     """
@@ -67,6 +71,9 @@ class Reading:
     near_patch_dn: float = 0.0
     middle_patch_dn: float = 0.0
     far_patch_dn: float = 0.0
+    blur_deg: float = 0.0
+    u_turn_deg: float = 0.0
+    u_latency_deg: float = 0.0
 
     @property
     def u_light_dn(self) -> float:

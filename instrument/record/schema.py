@@ -20,8 +20,8 @@ from instrument.record.reading import Kind
 from instrument.record.write_lock import TRY_S
 from instrument.text.network_share import network_share
 
-SCHEMA_VERSION = 6
-FIRST_STRICT, _FIRST_SEALED, _FIRST_STRAY_LIGHT = 4, 5, 6  # schema versions
+SCHEMA_VERSION = 7
+FIRST_STRICT, _FIRST_SEALED, _FIRST_STRAY_LIGHT, _FIRST_FLIGHT = 4, 5, 6, 7  # schema versions
 MOST_BYTES = 128 * 1024**2  # of one text or picture; the largest camera's picture needs half of it
 LEAST_SQLITE = (3, 37, 0)  # the first with STRICT tables
 _OPENING_S = 2.0  # of waiting for a lock; nothing moves yet
@@ -109,6 +109,11 @@ _STRAY_LIGHT = (
     _number("middle_patch_dn"),
     _number("far_patch_dn"),
 )
+_FLIGHT = (
+    _number("blur_deg", 0.0, 360.0),
+    _number("u_turn_deg", 0.0, 360.0),
+    _number("u_latency_deg", -360.0, 360.0),
+)
 _READING = (
     _integer("step"),
     _word("kind", get_args(Kind)),
@@ -134,6 +139,7 @@ _READING = (
     _plain("time_utc"),
     _plain("flags"),
     *_STRAY_LIGHT,
+    *_FLIGHT,
 )
 TABLES: dict[str, tuple[Column, ...]] = {
     "meta": (_text("key"), _META_VALUE),
@@ -165,9 +171,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
 
 def tables_of(version: int) -> dict[str, tuple[Column, ...]]:
     """Return the tables of a schema version; the columns that came later are always the last."""
-    if version >= _FIRST_STRAY_LIGHT:
-        return TABLES
-    return {name: tuple(c for c in own if c not in _STRAY_LIGHT) for name, own in TABLES.items()}
+    later = _FLIGHT * (version < _FIRST_FLIGHT) + _STRAY_LIGHT * (version < _FIRST_STRAY_LIGHT)
+    return {name: tuple(c for c in own if c not in later) for name, own in TABLES.items()}
 
 
 def tables_sql(version: int) -> str:

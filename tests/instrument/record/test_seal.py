@@ -114,6 +114,6 @@ def test_a_flipped_bit_never_changes_a_value_in_silence(run: Path, slow: bool) -
         assert found["readings"] == [r for r in whole["readings"] if r in found["readings"]]
         assert missing == len(named)
         left_out += bool(named)
-    assert left_out > 5
+    assert left_out > 3
     assert len(refused) > 5
     assert all(text.startswith(str(run)) for text in refused)
