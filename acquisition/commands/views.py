@@ -82,6 +82,9 @@ def _plan_rows(loaded: Loaded, plan: Plan) -> Iterator[tuple[str, str]]:
         f"places sample or tile {plan.swaps} times, sets the lamp {plan.hand_settings} times"
         + (", covers it once" if plan.darks_first_s else ""),
     )
+    flights = len({step.flight for step in plan.points} - {None})
+    if flights:
+        yield "motion", f"{flights} steady turns of theta_r, a frame at each angle on the way"
     if loaded.protocol.keep_frames:
         yield "frames", f"all kept, {frame_bytes(plan, loaded) / 1e6:.0f} MB"
     yield "duration", f"about {duration_text(plan.duration_s)}"

@@ -56,6 +56,15 @@ class Axis:
         self._target_deg = angle_deg
         self._stage.start_move(self._settings.to_device_deg(angle_deg))
 
+    def set_speed(self, speed_deg_per_s: float) -> None:
+        """Let later moves turn at this speed."""
+        self._stage.set_speed(speed_deg_per_s)
+
+    def restore_speed(self) -> None:
+        """Let later moves of a motor turn at the rig file's speed."""
+        if not isinstance(self._settings, HandAxis):
+            self._stage.set_speed(self._settings.speed_deg_per_s)
+
     def finish_move(self) -> None:
         """Wait for the end of the move; raise `DeviceError` if the axis missed its target."""
         reached = self._settings.from_device_deg(self._stage.wait())

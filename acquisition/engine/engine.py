@@ -15,6 +15,7 @@ from functools import partial
 
 from acquisition.engine.axis import Axis
 from acquisition.engine.exposure.exposer import Exposed, Exposer
+from acquisition.engine.fly.flights import Flights
 from acquisition.engine.frame_files import write_frames
 from acquisition.engine.frame_reduction import FrameReduction
 from acquisition.engine.onlookers import MEASURING, KnownLamp, Phase, Present
@@ -29,6 +30,7 @@ from acquisition.interlocks.references import References, what_to_look_at
 from acquisition.interlocks.watched_camera import WatchedCamera
 from acquisition.measure.drift import is_usable
 from acquisition.measure.window import Window
+from acquisition.plan.flight import AXIS, in_turns
 from acquisition.plan.moves import NoPathError
 from acquisition.plan.plan import Plan, Step
 from instrument.clock import Clock
@@ -99,6 +101,11 @@ class Engine:
         self._exposer = Exposer(
             camera, self._lamp, clock, protocol, rig, record, self._continue_step
         )
+        self._flights = Flights(
+            protocol=protocol, rig=rig, clock=clock, axis=devices.axes[AXIS], note=self._add_event,
+            positioner=self._positioner, exposer=self._exposer, reduction=self._reduction,
+            pause=self._pause, begin_step=self._announce, accept=self._accept_flown,
+        )  # fmt: skip
 
     def run(self, plan: Plan, progress: Progress | None = None) -> None:
         """Run all steps, or resume a stopped scan with the steps missing from its progress.
@@ -164,14 +171,14 @@ class Engine:
     def _begin(self, plan: Plan) -> None:
         """Home the axes and take the darks for which the operator covers the lamp."""
         self._positioner.home()
-        self._open_shutter()
+        self._positioner.open_shutter()
         self._exposer.start_clock(0.0)
         self._exposer.take_darks(plan.darks_first_s, self._reduction.window(self._positioner.pose))
 
     def _restore(self, plan: Plan, progress: Progress) -> None:
         """Restore the state in which the scan stopped, apart from its pose."""
         report_found(self._positioner.recover_position(), progress, self._rig)
-        self._open_shutter()
+        self._positioner.open_shutter()
         self._exposer.restore(progress.by_time)
         self._exposer.take_darks(plan.darks_first_s, self._reduction.window(self._positioner.pose))
 
@@ -235,10 +242,6 @@ class Engine:
             self._return_to(last, first.surface)
         self._exposer.start_clock(progress.elapsed_s)
 
-    def _open_shutter(self) -> None:
-        if self._rig.lamp.darkened_by == "shutter":
-            self._lamp.light()
-
     def _check_drift(self, plan: Plan, progress: Progress, first: Step) -> None:
         """Repeat the last drift check, if the block of the next step has one."""
         original = progress.drift_step(plan, first.block)
@@ -273,13 +276,29 @@ class Engine:
             return  # no path back, but there may be one from here to the next step
 
     def _measure_steps(self, plan: Plan, steps: Sequence[Step]) -> None:
+        for group in in_turns(steps):
+            if group[0].flight is None:
+                self._step_through(plan, group)
+            else:
+                self._place(group[0].surface)
+                self._flights.fly(group)
+
+    def _announce(self, step: Step) -> None:
+        self._step, self._phase = step, "moving"
+        self._begin_step(step.index, self._exposer.scan_s())
+
+    def _accept_flown(self, exposed: Exposed, reading: Reading) -> None:
+        self._on_frames(exposed, self._reduction.window(exposed.step.pose))
+        self._begin_commit(exposed, reading)
+        self._finish_accepting(exposed)
+
+    def _step_through(self, plan: Plan, steps: Sequence[Step]) -> None:
         waiting = None
         for step in steps:
             if self._pause.is_on:
                 self._accept(waiting)
                 raise Paused
-            self._step, self._phase = step, "moving"
-            self._begin_step(step.index, self._exposer.scan_s())
+            self._announce(step)
             if step.surface != self._positioner.surface:
                 self._accept(waiting)  # the operator may take their time, or give up
                 waiting = None

@@ -72,5 +72,8 @@ def _reading(exposed: Exposed, signal: Signal) -> Reading:
         time_s=exposed.time_s,
         free_s=exposed.free_s,
         time_utc=exposed.time_utc,
+        blur_deg=exposed.turn.blur_deg,
+        u_turn_deg=exposed.turn.u_deg,
+        u_latency_deg=exposed.turn.u_latency_deg,
         **asdict(signal),
     )

@@ -62,6 +62,7 @@ class Positioner:
         for name, axis in motors.items():
             if axis.homed():
                 found[name] = axis.position_deg()
+                axis.restore_speed()  # a turn may have been killed
             else:
                 axis.home()
         # nan for an axis set by hand
@@ -92,6 +93,38 @@ class Positioner:
         for name in dict.fromkeys(move.axis for move in self._moves):
             self._axes[name].settle()
         self.pose, self._moves = self.target, ()
+
+    def start_turn(self, name: str, end: Pose, speed_deg_per_s: float) -> None:
+        """Start a steady turn of a motor to a pose along a way that was checked, and return."""
+        axis = self._axes[name]
+        axis.set_speed(speed_deg_per_s)
+        self._moves, self.target = (), end
+        self._start(Move(name, getattr(end, name), 0.0))
+
+    def finish_turn(self, name: str) -> None:
+        """Wait for the end of a turn; later moves have the rig file's speed again."""
+        axis = self._axes[name]
+        axis.finish_move()
+        self.moving, self.pose = "", self.target
+        axis.restore_speed()
+
+    def break_off(self, name: str) -> None:
+        """Stop a turn where it is; at rest, do nothing."""
+        if self.moving == name:
+            self._axes[name].stop()
+            self._stand(name)
+
+    def stand_after(self, name: str, pause: ComputerPaused) -> None:
+        """Go on from where an axis stands after a pause of the computer, within bounds."""
+        axis = self._axes[name]
+        self._require_may_go_on(axis, pause)
+        self._stand(name)
+
+    def _stand(self, name: str) -> None:
+        axis = self._axes[name]
+        axis.restore_speed()
+        self.moving = ""
+        self.pose = self.target = self.pose._replace(**{name: axis.position_deg()})
 
     def _start(self, move: Move) -> None:
         axis = self._axes[move.axis]
@@ -147,6 +180,11 @@ class Positioner:
         self._asked = ""
         self._note(f"{request.text}: {answer}")
         self.surface = surface
+
+    def open_shutter(self) -> None:
+        """Let the lamp's light onto the sample, if it has a shutter."""
+        if self._rig.lamp.darkened_by == "shutter":
+            self._lamp.light()
 
     @property
     def asked(self) -> str:

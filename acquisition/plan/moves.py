@@ -72,6 +72,30 @@ def axis_moves(name: str, start_deg: float, end_deg: float, rig: Rig) -> Iterato
         start_deg = stop_deg
 
 
+def first_obstacle(start: Pose, end: Pose, axis: str, rig: Rig) -> tuple[str, str] | None:
+    """Return the first obstacle to a turn of one motor, as its cause and in words, or None.
+
+    Both ends must lie within its limits, and its way clear of all keep-out zones.
+    """
+    limits = rig.axes[axis]
+    for angle_deg in (getattr(start, axis), getattr(end, axis)):
+        if not limits.min_deg - SAME_ANGLE_DEG <= angle_deg <= limits.max_deg + SAME_ANGLE_DEG:
+            return (
+                f"limits of {axis}",
+                f"{axis} would go to {angle_deg:g} deg to reach a steady speed; its limits are "
+                f"{limits.min_deg:g} to {limits.max_deg:g} deg: stay further inside them",
+            )
+    for zone in rig.keep_out:
+        if enters_zone(zone, start, end, axis):
+            return (
+                f"keep-out zone {zone.name}",
+                f"the turn of {axis} from {getattr(start, axis):g} to {getattr(end, axis):g} deg "
+                f"meets the keep-out zone '{zone.name}': leave these angles out, or split the "
+                "sweep",
+            )
+    return None
+
+
 def _obstacle(start: Pose, moves: tuple[Move, ...], rig: Rig) -> tuple[str, str] | None:
     """Return the first obstacle on the path, as its cause and the move in words, or None."""
     pose = start

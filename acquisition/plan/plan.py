@@ -2,16 +2,19 @@
 
 Protocol and rig in, steps out; devices are unknown here. Hand-set axes vary slowest, so that the
 operator is asked as rarely as possible; every inner axis alternates its direction (serpentine).
-Geometries in which camera and lamp hide one another are left out and counted.
+Geometries in which camera and lamp hide one another are left out and counted. With `motion: fly`
+each sweep of theta_r is one steady turn, see `acquisition.plan.flight`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby, pairwise
 from typing import Protocol as Interface
 
 from acquisition.plan.exposure_ladder import expected_exposure_s, exposure_ladder_s
+from acquisition.plan.flight import in_turns, make_flight, preparation_s, require_flyable, runs
 from acquisition.plan.moves import Move, NoPathError, moves_between
 from acquisition.plan.pose import Pose, home_pose
 from acquisition.plan.tile_table import outside_table
@@ -34,6 +37,7 @@ class Step:
 
     `lamp_setting` numbers the positions of the lamp (theta_i, dphi), `block` its settings by hand;
     a reading is compared with a white tile of the same block. `preview`: the report shows a frame.
+    `flight` numbers the steady turns of theta_r; None for a step that is measured at rest.
     """
 
     index: int
@@ -48,6 +52,7 @@ class Step:
     start_s: float = 0.0
     duration_s: float = 0.0
     preview: bool = False
+    flight: int | None = None
 
 
 class Choosing(Interface):
@@ -113,6 +118,7 @@ class Plan:
 def make_plan(loaded: Loaded) -> Plan:
     """Plan the whole scan; raise `InputError` if any part of it is impossible."""
     protocol, rig = loaded.protocol, loaded.rig
+    require_flyable(loaded)
     poses = [pose for sweep in protocol.sweeps for pose in sweep_poses(sweep, rig)]
     limit_deg = min_separation_deg(rig)
     hidden = tuple(pose for pose in poses if pose.separation_deg < limit_deg)
@@ -122,7 +128,7 @@ def make_plan(loaded: Loaded) -> Plan:
             f"{_position(loaded, 'sweeps')}: camera and lamp hide one another in all {len(poses)} "
             f"geometries; allowed: angles {limit_deg:.2f} deg or more apart"
         )
-    steps = _with_previews(_ordered_steps(visible, protocol, rig))
+    steps = _with_previews(_numbered_flights(_ordered_steps(visible, protocol, rig), protocol))
     steps, blocked = _with_moves(steps, loaded)
     tiles = [step.pose for step in steps if step.kind == "tile"]
     problems = [
@@ -195,13 +201,39 @@ def _block(poses: list[Pose], protocol: Protocol) -> tuple[list[Target], list[Ta
     sample: list[Target] = [("point", pose) for pose in poses]
     if drift is not None:
         check: Target = ("drift", poses[0]._replace(theta_r=drift.theta_r_deg))
-        starts = range(0, len(poses), drift.every_points)
-        sample = [s for n in starts for s in (check, *sample[n : n + drift.every_points])]
+        starts = _check_starts(poses, protocol, drift.every_points)
+        parts = pairwise([*starts, len(poses)])
+        sample = [s for begin, end in parts for s in (check, *sample[begin:end])]
         sample.append(check)
     if tile is None:
         return sample, []
     settings = dict.fromkeys((pose.theta_i, pose.dphi) for pose in poses)
     return sample, [("tile", Pose(*setting, tile.theta_r_deg)) for setting in settings]
+
+
+def _check_starts(poses: Sequence[Pose], protocol: Protocol, every: int) -> Sequence[int]:
+    """Return the numbers of the poses before which the drift is checked; no check cuts a flight."""
+    if protocol.motion == "stepped":
+        return range(0, len(poses), every)
+    starts = [0]
+    for start in runs(poses)[1:]:
+        if start - starts[-1] >= every:
+            starts.append(start)
+    return starts
+
+
+def _numbered_flights(steps: Sequence[Step], protocol: Protocol) -> list[Step]:
+    """Number the flights of a scan with `motion: fly`."""
+    if protocol.motion == "stepped":
+        return list(steps)
+    numbered, flight = [], -1
+    for kind, group in groupby(steps, lambda step: step.kind):
+        own = list(group)
+        starts = set(runs([step.pose for step in own]) if kind == "point" else ())
+        for number, step in enumerate(own):
+            flight += number in starts
+            numbered.append(replace(step, flight=flight if kind == "point" else None))
+    return numbered
 
 
 def _step(
@@ -234,15 +266,39 @@ def _with_previews(steps: Sequence[Step]) -> list[Step]:
 def _with_moves(steps: Sequence[Step], loaded: Loaded) -> tuple[list[Step], list[str]]:
     """Add the moves to each step; return the steps, and one line for each obstacle met."""
     obstacles: dict[str, list[str]] = {}
-    start, moved = home_pose(loaded.rig), []
-    for step in steps:
+    start, moved = home_pose(loaded.rig), list[Step]()
+    for group in _moving_together(steps):
         try:
-            moved.append(replace(step, moves=moves_between(start, step.pose, loaded.rig)))
+            own, start = _moved(group, start, loaded)
+            moved += own
         except NoPathError as error:
             obstacles.setdefault(error.cause, []).append(error.move)
-            moved.append(step)
-        start = step.pose
+            moved += group
+            start = group[-1].pose
     return moved, [_blocked(loaded, moves) for moves in obstacles.values()]
+
+
+def _moving_together(steps: Sequence[Step]) -> Iterator[Sequence[Step]]:
+    for group in in_turns(steps):
+        yield from [group] if group[0].flight is not None else [[step] for step in group]
+
+
+def _moved(group: Sequence[Step], start: Pose, loaded: Loaded) -> tuple[list[Step], Pose]:
+    """Return a step, or those of a flight, with their moves, and where these end."""
+    rig, first = loaded.rig, group[0]
+    if first.flight is None:
+        return [replace(first, moves=moves_between(start, first.pose, rig))], first.pose
+    poses = [step.pose for step in group]
+    flight = make_flight(poses, first.expected_exposure_s, rig, loaded.protocol.fly)
+    moves = (*moves_between(start, flight.start, rig), *flight.moves(poses)[0])
+    rest = zip(group[1:], flight.moves(poses)[1:], strict=True)
+    new = first.flight == 0
+    wait_s = preparation_s(poses, first.expected_exposure_s, rig, new=new)
+    own = [
+        replace(first, moves=moves, duration_s=wait_s),
+        *(replace(step, moves=turn) for step, turn in rest),
+    ]
+    return own, flight.end
 
 
 def _blocked(loaded: Loaded, moves: Sequence[str]) -> str:
@@ -274,10 +330,11 @@ def _schedule(steps: Sequence[Step], hidden: tuple[Pose, ...], loaded: Loaded) -
     swaps, taken_s, scheduled = 0, set(darks_first_s), []
     surface: Surface | None = None
     for step in steps:
-        duration_s = sum(move.duration_s for move in step.moves)
+        duration_s = step.duration_s + sum(move.duration_s for move in step.moves)
         if step.surface != surface:  # the operator swaps sample and tile, or places the first
             swaps, surface, duration_s = swaps + 1, step.surface, duration_s + rig.swap_s
-        duration_s += _frames_s(step.frames, step.expected_exposure_s, rig)
+        if step.flight is None:
+            duration_s += _frames_s(step.frames, step.expected_exposure_s, rig)
         if step.expected_exposure_s not in taken_s:
             taken_s.add(step.expected_exposure_s)
             duration_s += _darks_s((step.expected_exposure_s,), rig.lamp.shutter_s, loaded)

@@ -25,6 +25,7 @@ from acquisition.results.effects.effect import Readings
 from acquisition.results.effects.lamp_level import drift_between, drift_noise, wander
 from acquisition.results.effects.lens import STRAY
 from acquisition.results.effects.rig_effects import has_effects, rig_effects
+from acquisition.results.effects.turning import turning_errors
 from analysis.data.measurements import SharedError
 from analysis.fit.certificate import CERTIFICATE
 from instrument.config.load import Loaded
@@ -132,6 +133,10 @@ def reduced_rows(rows: Rows, loaded: Loaded) -> Reduced:
     stray = stray_light(readings, loaded.rig)
     own = readings if stray is None else stray.subtracted(readings)
     reduced = reduce(own, loaded.protocol, rows.checks, doubted)
+    blurred, turned = turning_errors(reduced.points, reduced.radiance)
+    if blurred:
+        components = {**reduced.components, **blurred}
+        reduced = replace(reduced, components=components, shared=(*reduced.shared, *turned))
     if stray is not None:
         errors = _stray_light_errors(reduced.points, _tile_readings(own), stray)
         reduced = replace(reduced, shared=(*reduced.shared, *errors))

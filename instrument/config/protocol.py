@@ -229,6 +229,18 @@ class References(Section):
     drift_check: DriftCheck | None = None
 
 
+class FlyConfig(Section):
+    """Steady turning of theta_r, for `motion: fly`.
+
+    The axis turns so slowly that the peak of a Gaussian lobe whose full width at half maximum is
+    `narrowest_lobe_deg` is lowered by no more than `u_blur` of its height: see
+    `acquisition.plan.flight`.
+    """
+
+    narrowest_lobe_deg: Annotated[float, Field(ge=0.1, le=180)] = 10.0
+    u_blur: Annotated[float, Field(ge=1e-6, le=0.1)] = 0.002
+
+
 class FitConfig(Section):
     """Models to fit; by default all models of the ladder.
 
@@ -349,6 +361,8 @@ class Protocol(Section):
     dark_frames: Annotated[int, Field(ge=1, le=10_000)] = 8
     exposure_target: Annotated[float, Field(gt=0, lt=1)] = 0.7
     keep_frames: bool = False
+    motion: Literal["stepped", "fly"] = "stepped"
+    fly: FlyConfig = FlyConfig()
     references: References = References()
     fit: FitConfig = FitConfig()
     simulated_sample: SimulatedSample | None = None

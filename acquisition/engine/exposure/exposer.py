@@ -21,6 +21,7 @@ from acquisition.measure.hot_pixels import hot_pixel_text
 from acquisition.measure.linearity import require_possible_times
 from acquisition.measure.radiometry import Dark, average_dark
 from acquisition.measure.window import Window
+from acquisition.plan.exposure_ladder import longest_exposure_s
 from acquisition.plan.plan import Step
 from instrument.clock import Clock
 from instrument.config.protocol import Protocol
@@ -43,11 +44,27 @@ _LOOK_FOR_LIGHT = (
 )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Turn:
+    """Turn of the axis during an exposure, and the u of the mean angle, all in degrees.
+
+    `u_deg`: independent from frame to frame. `u_latency_deg`: signed, of an error that all share.
+    """
+
+    blur_deg: float = 0.0
+    u_deg: float = 0.0
+    u_latency_deg: float = 0.0
+
+
+AT_REST = Turn()
+
+
 @dataclass(frozen=True, slots=True)
 class Exposed:
     """Frames of a step with their dark, ready to be reduced.
 
     `time_s`: scan time at the middle of the frames. `free_s`: that from which the rig may move.
+    `turn`: of theta_r meanwhile; the step's pose is then the mean one.
     """
 
     step: Step
@@ -56,6 +73,7 @@ class Exposed:
     time_s: float
     free_s: float
     time_utc: str
+    turn: Turn = AT_REST
 
 
 @dataclass(slots=True)
@@ -83,6 +101,7 @@ class Exposer:
     _last: dict[Surface, Reading] = field(default_factory=dict, init=False)
     _outline: OutlineCheck = field(init=False)
     _swap: SwapCheck = field(init=False)
+    set_s: float = field(default=0.0, init=False)  # exposure that was prepared last
 
     def __post_init__(self) -> None:
         target = self.protocol.exposure_target
@@ -135,6 +154,47 @@ class Exposer:
         dark = self._dark(first.exposure_s, window)
         self._check.require_proportional(tried, frames, self._darks, window)
         return Exposed(step, frames, dark, time_s=time_s, free_s=self.scan_s(), time_utc=utc)
+
+    def prepare(self, exposure_s: float, window: Window) -> float:
+        """Set an exposure for frames of an axis that turns; return it as the camera took it.
+
+        Its dark is taken now, if there is none: the rig stands.
+        """
+        asked_s = self._search.asked_s(exposure_s)
+        self._search.set(asked_s)
+        self._dark(self._search.taken_s[asked_s], window)
+        self._search.set(asked_s)
+        self.set_s = self._search.taken_s[asked_s]
+        return self.set_s
+
+    @property
+    def target_dn(self) -> float:
+        """Level above black that the brightest part of the window should reach."""
+        camera = self.rig.camera
+        return self.protocol.exposure_target * (camera.max_dn - camera.black_level_dn)
+
+    def exposure_s(self, rate_dn_per_s: float) -> float:
+        """Return the exposure, as it is asked for, at which a brightness reaches the target."""
+        limit_s = self.target_dn / max(rate_dn_per_s, 1e-9)
+        return longest_exposure_s(limit_s, self.rig.camera, self._search.taken_s)
+
+    def dark(self, exposure_s: float) -> Dark:
+        """Return the dark of an exposure that was prepared."""
+        return self._darks[exposure_s]
+
+    def contradiction(self, frame: Frame, step: Step) -> str:
+        """Return how a frame contradicts the pose of a step; empty if it does not."""
+        text = self._outline.contradiction(frame.image, step)
+        self._swap.contradiction(frame, step)
+        return f"{text}. {_MEASURED_AGAIN}" if text else ""
+
+    def flown(self, step: Step, frame: Frame, turn: Turn) -> Exposed:
+        """Return the frame of a step that was taken while the axis turned."""
+        free_s = self.scan_s()
+        time_s = round(free_s - frame.exposure_s / 2, 3)
+        utc = self.clock.utc().isoformat()
+        dark = self._darks[frame.exposure_s]
+        return Exposed(step, [frame], dark, time_s, free_s, utc, turn)
 
     def _require_swapped(self, first: Frame, step: Step) -> None:
         """Raise `Interlock` if a reference shows the surface that should have been taken away."""
