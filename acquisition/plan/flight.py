@@ -20,8 +20,8 @@ from typing import Protocol, TypeVar
 
 from acquisition.plan.moves import Move, NoPathError, first_obstacle
 from acquisition.plan.pose import Pose
-from instrument.config.axes import HandAxis, MotorAxis
-from instrument.config.camera import CameraConfig, V4l2CameraConfig
+from instrument.config.axes import HandAxis, MotorAxis, Wired
+from instrument.config.camera import V4l2CameraConfig
 from instrument.config.load import Loaded
 from instrument.config.protocol import FlyConfig, SweepConfig, angles_deg
 from instrument.config.rig import Rig
@@ -37,6 +37,7 @@ _STEADY_S = 0.05  # at full speed before the first frame, and after the last
 _SLACK = 0.98  # share of the time between two angles that a frame may take
 _SLOWER, _SLOWEST = 0.9, 0.05  # factor of a speed with too much run-up; share of the first speed
 _DEFAULT_FRAMES_PER_S = 30.0  # of a camera whose rig file states none
+_ANSWERS, _ANSWER_S = 3, 0.02  # of a controller to each frame, and the usual time of one
 
 
 class _Step(Protocol):
@@ -151,17 +152,18 @@ def in_turns(steps: Sequence[S]) -> list[list[S]]:
     return [list(group) for _, group in groups]
 
 
-def frame_time_s(exposure_s: float, camera: CameraConfig) -> float:
-    """Return the time in seconds from one request of a single frame to the next.
+def frame_time_s(exposure_s: float, rig: Rig) -> float:
+    """Return the time in seconds from one frame to the next, each with the axis's positions.
 
     A camera that runs freely finishes the frame under way, and the frame that counts begins within
-    a period after that.
+    a period after that. A controller's answers take some time, too.
     """
-    own_s = exposure_s + camera.frame_overhead_s
+    camera, own_s = rig.camera, exposure_s + rig.camera.frame_overhead_s
+    asking_s = _ANSWERS * _ANSWER_S if isinstance(rig.axes[AXIS], Wired) else 0.0
     if not isinstance(camera, V4l2CameraConfig):
-        return own_s
+        return own_s + asking_s
     period_s = max(own_s, 1 / (camera.frames_per_s or _DEFAULT_FRAMES_PER_S))
-    return exposure_s + 2 * period_s
+    return exposure_s + 2 * period_s + asking_s
 
 
 def largest_blur_deg(fly: FlyConfig) -> float:
@@ -169,12 +171,17 @@ def largest_blur_deg(fly: FlyConfig) -> float:
     return fly.narrowest_lobe_deg * math.sqrt(3 * fly.u_blur / math.log(2))
 
 
-def make_flight(poses: Sequence[Pose], exposure_s: float, rig: Rig, fly: FlyConfig) -> Flight:
-    """Return the fastest flight past these poses; raise `NoPathError` without room for run-up."""
+def make_flight(
+    poses: Sequence[Pose], exposure_s: float, rig: Rig, fly: FlyConfig, pace: float = 1.0
+) -> Flight:
+    """Return the fastest flight past these poses; raise `NoPathError` without room for run-up.
+
+    pace: factor of the time of a frame, where frames were found to take longer.
+    """
     axis = rig.axes[AXIS]
     if isinstance(axis, HandAxis):
         raise InputError(f"{AXIS} is set by hand and cannot turn steadily")
-    angles, frame_s = [pose.theta_r for pose in poses], frame_time_s(exposure_s, rig.camera)
+    angles, frame_s = [pose.theta_r for pose in poses], pace * frame_time_s(exposure_s, rig)
     spacing = min((abs(b - a) for a, b in pairwise(angles)), default=math.inf)
     fastest = min(
         axis.speed_deg_per_s, _SLACK * spacing / frame_s, largest_blur_deg(fly) / exposure_s
@@ -221,7 +228,7 @@ def calibration_poses(poses: Sequence[Pose]) -> list[Pose]:
 
 def preparation_s(poses: Sequence[Pose], exposure_s: float, rig: Rig, *, new: bool) -> float:
     """Return the time in seconds before a flight: for a look, and the latency at its first use."""
-    look_s = _LOOKS * frame_time_s(exposure_s, rig.camera)
+    look_s = _LOOKS * frame_time_s(exposure_s, rig)
     if not new:
         return look_s
     there = calibration_poses(poses)

@@ -200,3 +200,30 @@ def test_a_missing_compiler_is_reported_before_the_run_folder_is_made(
     assert done.returncode == 3
     assert "no C compiler" in done.stderr
     assert not (tmp_path / "run").exists()
+
+
+def test_an_axis_that_turns_is_measured_at_the_angles_of_its_frames(
+    tmp_path: Path, protocol: Path, command: ReadyProcess
+) -> None:
+    """A steep lobe, of which a wrong angle or a blur would be seen; the model is the true one."""
+    text = yaml.safe_load(protocol.read_text()) | {"motion": "fly", "frames_per_point": 1}
+    views = {"start": -70.0, "stop": 0.0, "num": 15}
+    text["sweeps"] = [{"theta_i_deg": [45.0], "dphi_deg": [0.0], "theta_r_deg": views}]
+    text["simulated_sample"]["parameters"] |= {"sigma_deg": 8.0, "ks": 0.3}
+    flown, rig, folder = tmp_path / "flown.yaml", tmp_path / "rig.yaml", tmp_path / "run"
+    flown.write_text(yaml.safe_dump(text))
+    rig.write_text(RIG.read_text().replace(*QUICK))
+    done = command.run("run", flown, "--rig", rig, "--out", folder, "--json")
+    assert done.returncode == 0, done.stderr
+    fit = json.loads(done.stdout)
+    assert (fit["chosen"], fit["verdict"]) == ("oren_nayar+torrance_sparrow", "adequate")
+    with sqlite3.connect(f"file:{folder / 'record.sqlite'}?mode=ro", uri=True) as record:
+        rows = record.execute(
+            "SELECT theta_r_deg, blur_deg, u_latency_deg FROM reading WHERE kind = 'point'"
+        ).fetchall()
+        found = record.execute("SELECT text FROM event WHERE kind = 'latency'").fetchall()
+    assert len(rows) == 15
+    assert np.ptp([angle for angle, _, _ in rows]) > 65
+    assert all(blur > 0 and u != 0 for _, blur, u in rows)
+    latency_ms = float(found[0][0].split("s: ")[1].split()[0])
+    assert abs(latency_ms) < 20.0  # read-out and line

@@ -32,13 +32,15 @@ from instrument.errors import ComputerPaused, DeviceError, Interlock
 from instrument.record.event_kinds import LATENCY
 from instrument.record.reading import Reading
 
-log = logging.getLogger("acquisition.interlocks")
+log = logging.getLogger(__name__)
+interlocks = logging.getLogger("acquisition.interlocks")
 
 TURNS = 6  # over the angles of one sweep, before the scan gives up on what is missing
 _KEEP = (
     0.35,
     1.25,
 )  # of the target: a known exposure within these needs no other, and no calibration
+_ENOUGH, _SLOWER = 0.9, 1.5  # share of angles with a frame; factor of the time of a frame
 _LEAST_WAIT_S = 0.001
 _STUCK_S = 0.5  # without progress the axis has stopped
 
@@ -65,6 +67,7 @@ class Flights:
     _latencies: dict[float, Latency] = field(default_factory=dict, init=False)
     _brightest: float = field(default=0.0, init=False)  # counts per second in the last sweep
     _contradicted: set[int] = field(default_factory=set, init=False)
+    _pace: float = field(default=1.0, init=False)
     _sweep: Sequence[Step] = field(default=(), init=False)
     _done: set[int] = field(default_factory=set, init=False)  # of the sweep's steps
 
@@ -97,7 +100,7 @@ class Flights:
             self.positioner.stand_after(AXIS, pause)
 
     def _flight(self, poses: Sequence[Pose], exposure_s: float) -> Flight:
-        return make_flight(poses, exposure_s, self.rig, self.protocol.fly)
+        return make_flight(poses, exposure_s, self.rig, self.protocol.fly, self._pace)
 
     def _prepare(self, steps: Sequence[Step]) -> float:
         """Stand on the run-up, look, and set the exposure; return it as the camera took it."""
@@ -128,7 +131,10 @@ class Flights:
     def _calibrated(self, exposure_s: float) -> Latency:
         """Find the latency at an exposure by a turn there and back, where the view is oblique."""
         there = calibration_poses([step.pose for step in self._sweep])
-        turns = self._fast_turn(there, exposure_s), self._fast_turn(there[::-1], exposure_s)
+        for _ in range(TURNS):
+            turns = self._fast_turn(there, exposure_s), self._fast_turn(there[::-1], exposure_s)
+            if not self._was_too_fast(2 * len(there), sum(map(len, turns))):
+                break
         found = latency_of(
             turns,
             lambda angle_deg: self.reduction.window(there[0]._replace(theta_r=angle_deg)),
@@ -140,14 +146,26 @@ class Flights:
         return found
 
     def _fast_turn(self, poses: Sequence[Pose], exposure_s: float) -> list[Shot]:
-        flight = make_flight(poses, exposure_s, self.rig, ANY_BLUR)
+        flight = make_flight(poses, exposure_s, self.rig, ANY_BLUR, self._pace)
         self.positioner.move_to(flight.start)
         return [shot for _, shot in self._shots(poses, flight)]
 
+    def _was_too_fast(self, angles: int, frames: int) -> bool:
+        """Return True, and turn more slowly from now on, where angles went by without a frame."""
+        if frames >= _ENOUGH * angles:
+            return False
+        self._pace *= _SLOWER
+        log.warning(
+            "%s: %d of %d angles went by without a frame, which takes longer than the rig file "
+            "says: turns %g times more slowly", AXIS, angles - frames, angles, _SLOWER,
+        )  # fmt: skip
+        return True
+
     def _measure(self, steps: Sequence[Step], flight: Flight, latency: Latency) -> None:
         """Turn past the steps and have their readings accepted."""
-        self._brightest = 0.0
+        self._brightest, frames = 0.0, 0
         for number, shot in self._shots([step.pose for step in steps], flight, steps):
+            frames += 1
             exposed = self._exposed(steps[number], shot, latency)
             if exposed is None:
                 continue
@@ -158,6 +176,7 @@ class Flights:
                 continue  # flown past again, with a shorter exposure
             self.accept(exposed, reading)
             self._done.add(steps[number].index)
+        self._was_too_fast(len(steps), frames)
 
     def _shots(
         self, poses: Sequence[Pose], flight: Flight, steps: Sequence[Step] = ()
@@ -241,7 +260,7 @@ class Flights:
             raise Interlock(text)
         if text:
             self._contradicted.add(step.index)
-            log.warning("%s. It is measured again", text)
+            interlocks.warning("%s. It is measured again", text)
             return None
         return self.exposer.flown(replace(step, pose=pose), shot.frame, turn)
 

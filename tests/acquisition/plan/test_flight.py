@@ -57,7 +57,7 @@ def test_a_flight_is_as_fast_as_blur_frames_axis_and_room_allow(flown: Loaded) -
         assert speed <= axis.speed_deg_per_s
         assert speed * exposure_s <= largest_blur_deg(fly) * (1 + 1e-9)
         spacing = abs(angles[1] - angles[0])
-        assert speed * frame_time_s(exposure_s, rig.camera) <= spacing
+        assert speed * frame_time_s(exposure_s, rig) <= spacing
         ramp_deg = speed**2 / (2 * axis.acceleration_deg_per_s2)
         for end, at in ((flight.start, angles[0]), (flight.end, angles[-1])):
             assert abs(end.theta_r - at) >= ramp_deg
