@@ -18,7 +18,7 @@ import typer
 from acquisition.calibrate_cli import calibrate
 from acquisition.cli_parts import Commands, Json, ProtocolFile, RigFile, RigOnly, RunFolder
 from acquisition.new_cli import new
-from acquisition.outcomes_cli import compare, export, runs
+from acquisition.outcomes_cli import compare, export, map_, runs
 from acquisition.plan_cli import plan
 from acquisition.terminal import stop_signals
 from acquisition.terminal.streams import lasting_streams
@@ -251,6 +251,7 @@ def report(
     report_run(folder, pdf=pdf, figures=figures, as_json=json)
 
 
+app.command("map")(map_)
 for command in (export, compare, runs):
     app.command()(command)
 

@@ -1,4 +1,4 @@
-"""Commands about runs that have been measured: export, compare, runs."""
+"""Commands about runs that have been measured: export, compare, runs, map."""
 
 from __future__ import annotations
 
@@ -66,3 +66,28 @@ def runs(
     from acquisition.commands.outcomes.runs import list_runs
 
     list_runs(folder, as_json=json)
+
+
+def map_(
+    folder: RunFolder,
+    cell_mm: Annotated[
+        float | None,
+        typer.Option(help="Side of a cell in mm. Default: 0.5, or a pixel where that is larger."),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            help="Model for each cell: oren_nayar, oren_nayar_exact, oren_nayar_qualitative, alone "
+            "or with +torrance_sparrow. Default: that of the run's fit."
+        ),
+    ] = None,
+    nexus: Annotated[bool, typer.Option("--nexus", help="Write map.nxs, too (h5py).")] = False,
+    json: Json = False,
+) -> None:
+    """Map albedo and roughness over the sample of a run that kept its frames.
+
+    Writes map.npz and map.html into the run's folder, and tells whether the sample is uniform.
+    """
+    from acquisition.commands.outcomes.map import map_run
+
+    map_run(folder, cell_mm, model, nexus=nexus, as_json=json)

@@ -16,6 +16,7 @@ from instrument.geometry import BoolArray, FloatArray, IntArray
 # Beyond chance: a scatter or chi2 that is as seldom as a normal deviate of so many sigma.
 _SEEN_SIGMA = 4.0
 _REJECTED_SIGMA = 3.09  # one of 1000 cells of which the model holds
+_LARGEST_U = 5.0  # of the median u
 _LEAST_EXCESS = 0.05  # of the variance: no u is known better
 
 
@@ -39,12 +40,14 @@ class Spread:
 def spread_of(values: FloatArray, u: FloatArray) -> Spread | None:
     """Return the spread of values (...) with their own u (...), in one unit; None for none.
 
-    Cells whose value or u is NaN do not count; u is without what all cells share.
+    Cells whose value or u is NaN do not count, nor those whose u is far above the usual one, such
+    as at the sample's edge; u is without what all cells share.
     """
     known = np.isfinite(values) & np.isfinite(u) & (u > 0)
-    own, u_own = values[known], u[known]
-    if own.size < 2:
+    if np.count_nonzero(known) < 2:
         return None
+    known &= u <= _LARGEST_U * np.median(u[known])
+    own, u_own = values[known], u[known]
     weight = 1 / u_own**2
     mean = float(np.sum(own * weight) / np.sum(weight))
     chi2 = float(np.sum(np.square((own - mean) / u_own))) / (own.size - 1)

@@ -17,11 +17,15 @@ _LEAST_SIDE = 2  # cells; fewer are no map
 
 @dataclass(frozen=True, slots=True)
 class CellGrid:
-    """Rows and columns of square cells with sides of `cell_mm`; row 0 has the largest y."""
+    """Rows and columns of square cells with sides of `cell_mm`; row 0 has the largest y.
+
+    middle_mm: y of the grid's middle, other than 0 for a part of a grid.
+    """
 
     cell_mm: float
     rows: int
     columns: int
+    middle_mm: float = 0.0
 
     @classmethod
     def of(cls, sample: Sample, rig: Rig, cell_mm: float) -> CellGrid:
@@ -51,7 +55,12 @@ class CellGrid:
     def y_mm(self) -> FloatArray:
         """Middles of the rows, (rows,) in mm from the axis, falling."""
         place = (self.rows - 1) / 2 - np.arange(self.rows)
-        return np.asarray(self.cell_mm * place, dtype=np.float64)
+        return np.asarray(self.middle_mm + self.cell_mm * place, dtype=np.float64)
+
+    def band(self, start: int, stop: int) -> CellGrid:
+        """Return the rows from `start` up to `stop`, which is not one of them."""
+        middle_mm = float(self.y_mm[start : min(stop, self.rows)].mean())
+        return CellGrid(self.cell_mm, min(stop, self.rows) - start, self.columns, middle_mm)
 
     def to_mm(self, per_cell: tuple[int, int] = (1, 1)) -> FloatArray:
         """Return the matrix (3, 3) from (column, row, 1) of parts of cells to (x, y, 1) in mm.
@@ -60,5 +69,5 @@ class CellGrid:
         """
         across, down = (self.cell_mm / n for n in per_cell)
         left = -self.columns * self.cell_mm / 2 + across / 2
-        top = self.rows * self.cell_mm / 2 - down / 2
+        top = self.middle_mm + self.rows * self.cell_mm / 2 - down / 2
         return np.array([[across, 0, left], [0, -down, top], [0, 0, 1.0]])

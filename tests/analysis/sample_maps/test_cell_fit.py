@@ -11,7 +11,7 @@ from analysis.models import MODELS
 from analysis.sample_maps.cell_fit import CellFits, determined, fit_cells
 from analysis.sample_maps.sigma_table import MAPPED, SigmaTable
 from instrument.geometry import Geometry
-from tests.support.sample_cells import Cells, random_cells
+from tests.support.sample_maps.cells import Cells, random_cells
 
 GLOSSY = "oren_nayar+torrance_sparrow"
 

@@ -1,0 +1,143 @@
+"""Light of the cells in each reading of a run, from the frames that it has kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.measure.hot_pixels import find_hot_pixels
+from acquisition.measure.rectify.cell_grid import CellGrid
+from acquisition.measure.rectify.kept_files import dark_name, step_of
+from acquisition.measure.rectify.light import FloatImage, light_dn
+from acquisition.measure.rectify.rectified import rectify
+from acquisition.measure.window import window_at
+from instrument.config.load import Loaded
+from instrument.errors import InputError
+from instrument.geometry import BoolArray, FloatArray
+from instrument.pinhole import Pinhole
+from instrument.record.reading import Reading
+from instrument.record.record import Record
+from instrument.text.atomic_file import read_file
+
+_WORKERS = 2
+_SHOWN = 3  # names of missing files in a message
+
+
+@dataclass(frozen=True, slots=True)
+class CellLight:
+    """Light of each cell in K readings, in DN: cells (K, rows, columns), NaN where there is none.
+
+    window: (K,), that of the measuring window in the same pictures.
+    """
+
+    cells: NDArray[np.float32]
+    window: FloatArray
+
+
+class KeptFrames:
+    """Frames and darks that a run has kept, by step.
+
+    Raises `InputError` where it has kept none. `without_dark`: exposures in seconds of which the
+    record has a mean alone.
+    """
+
+    def __init__(self, record: Record, loaded: Loaded) -> None:
+        self._run, self._camera = record.folder, loaded.rig.camera
+        self._pinhole, self._patch = Pinhole.of(loaded.rig), loaded.protocol.window
+        self._names = _by_step(record)
+        self._means = {exposure_s: mean for exposure_s, _, mean, _ in record.darks()}
+        self._darks: dict[float, tuple[FloatImage | float, BoolArray | None]] = {}
+        self.without_dark: set[float] = set()
+
+    def steps(self) -> set[int]:
+        """Return the steps whose frames were kept."""
+        return set(self._names)
+
+    def require(self, readings: Sequence[Reading]) -> None:
+        """Raise `InputError` that names the kept files of these readings that are missing."""
+        names = [name for r in readings for name in self._names.get(r.step, ())]
+        lost = [name for name in names if not (self._run / name).is_file()]
+        if lost:
+            more = f" and {len(lost) - _SHOWN} more" if len(lost) > _SHOWN else ""
+            raise InputError(
+                f"{self._run}: {len(lost)} of {len(names)} frames that the record names are "
+                f"missing: {', '.join(lost[:_SHOWN])}{more}: put them back into the run's folder"
+            )
+
+    def light(self, readings: Sequence[Reading], grid: CellGrid) -> CellLight:
+        """Return the light of the cells in these readings, whose darks are read first."""
+        for exposure_s in {r.exposure_s for r in readings}:
+            self._darks.setdefault(exposure_s, self._dark(exposure_s))
+        cells = np.empty((len(readings), grid.rows, grid.columns), dtype=np.float32)
+        window = np.empty(len(readings))
+
+        def read(k: int) -> None:
+            light = self._light(readings[k])
+            window[k] = self._window_dn(light, readings[k].theta_r_deg)
+            cells[k] = rectify(light, grid, self._pinhole, readings[k].theta_r_deg)
+
+        with ThreadPoolExecutor(_WORKERS) as pool:
+            for _ in pool.map(read, range(len(readings))):
+                pass
+        return CellLight(cells, window)
+
+    def _light(self, reading: Reading) -> FloatImage:
+        images = [self._image(name) for name in self._names[reading.step]]
+        dark, hot = self._darks[reading.exposure_s]
+        return light_dn(images, dark, hot, self._camera, self._pinhole)
+
+    def _window_dn(self, light: FloatImage, theta_r_deg: float) -> float:
+        """Return the mean of the measuring window over the patch's area, without NaN."""
+        window = window_at(theta_r_deg, self._pinhole, self._patch.width_mm, self._patch.height_mm)
+        rows, columns = np.ogrid[window.crop]
+        area = window.weights * self._pinhole.cos4(columns, rows)
+        own = light[window.crop]
+        known = np.isfinite(own)
+        return float(np.sum(area[known] * own[known]) / max(float(area[known].sum()), 1e-30))
+
+    def _dark(self, exposure_s: float) -> tuple[FloatImage | float, BoolArray | None]:
+        name = dark_name(exposure_s)
+        if (self._run / name).is_file():
+            dark = self._image(name, np.dtype(np.float32))
+            return dark, find_hot_pixels(dark.astype(np.float64), self._camera)
+        self.without_dark.add(exposure_s)
+        return self._means.get(exposure_s, float(self._camera.black_level_dn)), None
+
+    def _image(self, name: str, kind: np.dtype[Any] | None = None) -> NDArray[Any]:
+        """Return the picture in a file, (rows, columns); raises `InputError` for any other."""
+        import cv2
+
+        path, shape = self._run / name, (self._camera.height_px, self._camera.width_px)
+        least = np.dtype(np.uint8 if self._camera.bit_depth == 8 else np.uint16)
+        try:
+            data = np.frombuffer(read_file(path, 16 * shape[0] * shape[1] + 65536), np.uint8)
+            image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path}: cannot be read: {error}") from None
+        if image is None or image.shape != shape or image.dtype != (kind or least):
+            found = "no picture" if image is None else f"{image.shape}, {image.dtype}"
+            raise InputError(
+                f"{path}: {found}; allowed: a TIFF of {shape} and {kind or least}, as the scan "
+                "wrote it"
+            )
+        return np.asarray(image)
+
+
+def _by_step(record: Record) -> Mapping[int, list[str]]:
+    """Return the names of the kept frames by step; raises `InputError` where there are none."""
+    found: dict[int, list[str]] = {}
+    for name in record.frame_files():
+        step = step_of(name)
+        if step is not None:
+            found.setdefault(step, []).append(name)
+    if not found:
+        raise InputError(
+            f"{record.folder}: the frames of this run were not kept, and a map needs them; "
+            "allowed: a run whose protocol has keep_frames: true"
+        )
+    return found

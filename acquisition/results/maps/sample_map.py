@@ -1,0 +1,213 @@
+"""Map of a run's sample: frames to cells, BRDF of each cell, and the fit of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from acquisition.measure.rectify.cell_grid import CellGrid
+from acquisition.results.maps.cell_brdf import cell_data, in_own_light, places_of, usable
+from acquisition.results.maps.kept_cells import KeptFrames
+from acquisition.results.maps.mean_curve import MeanCurve
+from acquisition.results.maps.surface_height import (
+    Height,
+    find_height,
+    middle,
+)
+from acquisition.results.maps.u_shared import UnknownHeight, u_shared
+from acquisition.results.reduction import Reduced, reduced_run, require_usable
+from analysis.sample_maps.block_fit import CellData, fit_blocks
+from analysis.sample_maps.places import TableField
+from analysis.sample_maps.sample_map import SampleMap
+from instrument.config.load import Loaded
+from instrument.config.rig import Rig
+from instrument.errors import InputError, NotDetermined
+from instrument.geometry import BoolArray, FloatArray
+from instrument.pinhole import Pinhole
+from instrument.record.reading import Reading
+from instrument.record.record import Record
+
+_USUAL_MM = 0.5
+_MOST_BYTES = 400 * 1024**2  # of the cells that are in memory at a time
+_LEAST_U_MM = 0.02  # of a height that the texture shows: what else moves a picture (assumed)
+
+
+def map_sample(
+    record: Record, loaded: Loaded, model: str, cell_mm: float | None = None
+) -> SampleMap:
+    """Fit the model in each cell of the run's sample.
+
+    cell_mm: side of a cell; None for a usual one, or a pixel where that is larger.
+    Raises `InputError` where frames were not kept or are missing, or the cells have no size that
+    the camera resolves, and `NotDetermined` where the curve does not determine the model.
+    """
+    cell_mm = usual_cell_mm(loaded.rig) if cell_mm is None else cell_mm
+    grid = CellGrid.of(loaded.protocol.sample, loaded.rig, cell_mm)
+    frames = KeptFrames(record, loaded)
+    reduced = reduced_run(record, loaded)
+    require_usable(reduced)
+    kept = reduced.valid & _has_frames(reduced, frames) & usable(reduced.points, grid, loaded.rig)
+    if not kept.any():
+        raise NotDetermined(
+            f"{record.folder}: no reading with kept frames resolves cells of {cell_mm:g} mm: name "
+            "larger ones"
+        )
+    readings = [p for p, own in zip(reduced.points, kept, strict=True) if own]
+    frames.require(readings)
+    curve = MeanCurve.of(_subset(reduced, kept), loaded, model)
+    return _Mapping(frames, readings, curve, grid, loaded).made(reduced)
+
+
+def usual_cell_mm(rig: Rig) -> float:
+    """Return the side of a cell where none is named."""
+    return max(_USUAL_MM, rig.camera.field_width_mm / rig.camera.width_px)
+
+
+def _has_frames(reduced: Reduced, frames: KeptFrames) -> BoolArray:
+    steps = frames.steps()
+    return np.array([p.step in steps for p in reduced.points], dtype=bool)
+
+
+def _subset(reduced: Reduced, kept: BoolArray) -> Reduced:
+    """Return the run with all other points flagged, so that no fit uses them."""
+    flags = tuple(
+        flag or ("" if own else "not mapped") for flag, own in zip(reduced.flags, kept, strict=True)
+    )
+    return replace(reduced, flags=flags)
+
+
+class _Mapping:
+    """Mapping of one run, in bands of rows that memory holds."""
+
+    def __init__(
+        self,
+        frames: KeptFrames,
+        readings: Sequence[Reading],
+        curve: MeanCurve,
+        grid: CellGrid,
+        loaded: Loaded,
+    ) -> None:
+        self._frames, self._readings, self._curve = frames, readings, curve
+        self._grid, self._loaded = grid, loaded
+        self._pinhole = Pinhole.of(loaded.rig)
+        self._theta_r_deg = np.array([r.theta_r_deg for r in readings])
+
+    def made(self, reduced: Reduced) -> SampleMap:
+        """Return the map."""
+        bands = self._bands()
+        first = self._data(bands[0])
+        height = self._height(first, bands[0]) if len(bands) == 1 else self._height_of_middle()
+        tables, maps = self._tables(height), []
+        for number, band in enumerate(bands):
+            data = first if number == 0 else self._data(band)
+            data = in_own_light(data, self._readings, height, band, self._loaded.rig)
+            maps.append(fit_blocks(data, tables, self._nearest_mm()))
+        whole = {name: np.concatenate([m[name] for m in maps]) for name in maps[0]}
+        return self._as_map(whole, data, height, reduced)
+
+    def _tables(self, height: Height) -> TableField:
+        grid, places = self._grid, places_of(self._readings, self._loaded.rig, height.mm)
+        half_mm = grid.columns * grid.cell_mm / 2, grid.rows * grid.cell_mm / 2
+        return TableField.of(self._curve.fit.model, places, half_mm)
+
+    def _u_height(self, height: Height) -> float:
+        """Return u of the height in units of the rig's placement."""
+        u_placement_mm = self._loaded.rig.u_placement_mm
+        return min(height.u_mm / u_placement_mm, 1.0) if u_placement_mm else 0.0
+
+    def _bands(self) -> list[CellGrid]:
+        per_row = 4 * len(self._readings) * self._grid.columns
+        rows = max(1, _MOST_BYTES // per_row)
+        return [self._grid.band(k, k + rows) for k in range(0, self._grid.rows, rows)]
+
+    def _data(self, grid: CellGrid) -> CellData:
+        light = self._frames.light(self._readings, grid)
+        return cell_data(light, self._readings, self._curve, grid, self._loaded)
+
+    def _height_of_middle(self) -> Height:
+        rows = middle(self._grid.rows)
+        band = self._grid.band(rows.start, rows.stop)
+        return self._height(self._data(band), band)
+
+    def _height(self, data: CellData, grid: CellGrid) -> Height:
+        rows, columns = middle(grid.rows), middle(grid.columns)
+        part = grid.band(rows.start, rows.stop)
+        part = replace(part, columns=len(range(*columns.indices(grid.columns))))
+        u_mm = self._loaded.rig.u_placement_mm
+        found = find_height(
+            data.brdf[:, rows, columns], self._theta_r_deg, part, self._pinhole, u_mm
+        )
+        return replace(found, u_mm=max(found.u_mm, _LEAST_U_MM))
+
+    def _u_shared(
+        self, maps: dict[str, FloatArray], data: CellData, height: Height
+    ) -> dict[str, FloatArray]:
+        u_mm = min(height.u_mm, self._loaded.rig.u_placement_mm)
+        return u_shared(
+            {name: maps[name] for name in self._curve.values},
+            self._curve,
+            data,
+            UnknownHeight(u_mm, self._u_height(height), self._theta_r_deg),
+        )
+
+    def _nearest_mm(self) -> float:
+        return min(self._loaded.rig.beam_length_mm, self._loaded.rig.lamp_distance_mm)
+
+    def _as_map(
+        self, maps: dict[str, FloatArray], data: CellData, height: Height, reduced: Reduced
+    ) -> SampleMap:
+        protocol, curve = self._loaded.protocol, self._curve
+        names = tuple(curve.values)
+        if not np.isfinite(maps["chi2"]).any():
+            raise NotDetermined("no cell has more geometries than the model has parameters")
+        return SampleMap(
+            title=protocol.name,
+            sample=protocol.sample.name,
+            model=curve.fit.model,
+            relative=curve.relative,
+            cell_mm=self._grid.cell_mm,
+            x_mm=self._grid.x_mm,
+            y_mm=self._grid.y_mm,
+            values={name: maps[name] for name in names},
+            u_own={name: maps[f"u_{name}"] for name in names},
+            u_shared=self._u_shared(maps, data, height),
+            mean={name: (value, curve.fit.u[name]) for name, value in curve.values.items()},
+            chi2=maps["chi2"],
+            count=maps["count"],
+            geometries=len(self._readings),
+            height_mm=(height.mm, height.u_mm),
+            notes=tuple(self._notes(reduced, height)),
+        )
+
+    def _notes(self, reduced: Reduced, height: Height) -> list[str]:
+        left_out = int(np.sum(reduced.valid)) - len(self._readings)
+        found = []
+        if left_out:
+            found.append(
+                f"{left_out} geometries are left out: their frames were not kept, or too grazing "
+                "for cells of this size"
+            )
+        if np.isfinite(height.u_mm):
+            found.append(
+                f"the texture shows the surface {height.mm:.3f} mm (u {height.u_mm:.3f} mm) above "
+                "the axis, and the cells follow it"
+            )
+        if self._frames.without_dark:
+            found.append(
+                "the darks of this run were not kept: each exposure's mean dark is subtracted from "
+                "all pixels alike"
+            )
+        if self._curve.relative:
+            found.append(
+                "no white tile was measured: albedo and ks count relative to one another, and the "
+                "lamp's levels are those of the mean curve"
+            )
+        return found
+
+
+def require_model(name: str, allowed: Sequence[str]) -> None:
+    """Raise `InputError` for a model that a map cannot fit."""
+    if name not in allowed:
+        raise InputError(f"--model: {name}; allowed for a map: {', '.join(allowed)}")

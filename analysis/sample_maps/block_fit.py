@@ -1,0 +1,80 @@
+"""Fit of all cells of a map, in blocks that are small enough to have one set of angles each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.sample_maps.cell_fit import CellFits, fit_cells
+from analysis.sample_maps.places import TableField
+from instrument.geometry import FloatArray
+
+_LARGEST_ANGLE = 0.1  # degrees, from the middle of a block to its side
+_MOST_CELLS = 32  # along a side: their sums stay in the processor's cache
+_WORKERS = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellData:
+    """BRDF of cells: brdf (K, rows, columns) in 1/sr, NaN where a cell has none.
+
+    x_mm (columns,), y_mm (rows,): places. floor, per_brdf, relative: (K,) each; the variance of a
+    value is floor + per_brdf * brdf + (relative * brdf)^2, in 1/sr^2.
+    """
+
+    brdf: NDArray[np.float32]
+    x_mm: FloatArray
+    y_mm: FloatArray
+    floor: FloatArray
+    per_brdf: FloatArray
+    relative: FloatArray
+
+    def block(self, rows: slice, columns: slice) -> tuple[FloatArray, FloatArray]:
+        """Return BRDF (K, C) in 1/sr of the block's cells, and its variance (K, C)."""
+        own = self.brdf[:, rows, columns]
+        brdf = own.reshape(own.shape[0], -1).astype(np.float64)
+        return brdf, self.variance(brdf)
+
+    def variance(self, brdf: FloatArray) -> FloatArray:
+        """Return the variance, in 1/sr^2, of values (K,) or (K, C) in 1/sr."""
+        floor, per_brdf, relative = (
+            a if brdf.ndim == 1 else a[:, np.newaxis]
+            for a in (self.floor, self.per_brdf, self.relative)
+        )
+        return np.asarray(floor + per_brdf * np.maximum(brdf, 0.0) + np.square(relative * brdf))
+
+
+def fit_blocks(data: CellData, tables: TableField, distance_mm: float) -> dict[str, FloatArray]:
+    """Return the fields of `CellFits` as maps (rows, columns) by name, in their units.
+
+    distance_mm: that of the nearer one of lamp and camera.
+    """
+    shape = data.brdf.shape[1:]
+    found = {field.name: np.full(shape, np.nan) for field in fields(CellFits)}
+
+    def fit(block: tuple[slice, slice]) -> None:
+        rows, columns = block
+        table = tables.at(float(data.x_mm[columns].mean()), float(data.y_mm[rows].mean()))
+        fits = fit_cells(table, *data.block(rows, columns))
+        for name, values in found.items():
+            own = values[rows, columns]
+            own[...] = getattr(fits, name).reshape(own.shape)
+
+    with ThreadPoolExecutor(_WORKERS) as pool:
+        for _ in pool.map(fit, _blocks(data, distance_mm)):
+            pass
+    return found
+
+
+def _blocks(data: CellData, distance_mm: float) -> Iterator[tuple[slice, slice]]:
+    cell_mm = abs(float(data.x_mm[1] - data.x_mm[0])) if data.x_mm.size > 1 else 1.0
+    side_mm = 2 * np.radians(_LARGEST_ANGLE) * distance_mm
+    side = int(np.clip(side_mm / cell_mm, 1, _MOST_CELLS))
+    rows, columns = data.brdf.shape[1:]
+    for row in range(0, rows, side):
+        for column in range(0, columns, side):
+            yield slice(row, row + side), slice(column, column + side)

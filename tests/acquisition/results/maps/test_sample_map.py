@@ -1,0 +1,130 @@
+"""Maps of simulated samples that vary: the truth of each cell, within its u."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from acquisition.results.maps.sample_map import map_sample
+from analysis.sample_maps.sample_map import SampleMap
+from instrument.errors import InputError
+from instrument.record.record import Record
+from tests.support.sample_maps.varied import Varied, truth
+from tests.support.scans import changed, shortest_scan
+from tests.support.whole_scans.stopped_scan import scan
+
+BOTH, ONE = (30.0, 60.0), (45.0,)
+QUICK = [
+    Varied("halves", BOTH, True, 1),
+    Varied("gradient", ONE, True, 2),
+    Varied("patch", ONE, False, 3),
+]
+MORE = [
+    Varied(pattern, incidences, tile, seed)
+    for seed in range(10, 14)
+    for pattern in ("halves", "gradient", "patch")
+    for incidences, tile in ((BOTH, True), (ONE, True), (ONE, False))
+]
+
+
+def _inside(found: SampleMap, true: dict[str, np.ndarray], name: str) -> np.ndarray:
+    """True for each cell of one place that has the truth within 1.96 u."""
+    off = np.abs(found.values[name] - true[name]) / found.u(name)
+    known = np.isfinite(off)
+    assert known.sum() > 0.6 * off.size
+    return np.asarray(off[known] < 1.96)
+
+
+@pytest.mark.parametrize("varied", QUICK, ids=lambda v: v.pattern)
+def test_the_truth_of_a_cell_lies_within_its_u(varied: Varied, tmp_path: Path) -> None:
+    found, loaded = varied.mapped(tmp_path / "run")
+    true = truth(found, loaded)
+    assert _inside(found, true, "sigma_deg").mean() > 0.85
+    if varied.tile:  # its own error is that of all cells; without, light of two bounces is unknown
+        apart = np.nanmedian(np.abs(found.values["sigma_deg"] - true["sigma_deg"]))
+        assert apart < 0.3
+        assert np.nanmedian(np.abs(found.values["albedo"] / true["albedo"] - 1)) < 0.015
+    assert found.relative != varied.tile
+    assert not found.uniform
+    assert "albedo and sigma_deg" in found.headline()
+    # An edge is texture enough to tell the height.
+    if varied.pattern == "halves":
+        assert found.height_mm[0] == pytest.approx(0.15, abs=0.06)
+
+
+@pytest.mark.slow
+def test_the_truth_lies_within_u_in_about_95_percent_of_the_cells(
+    tmp_path: Path, slow: bool
+) -> None:
+    if not slow:
+        pytest.skip("36 scans take a minute; one of each pattern is tested above")
+    inside: dict[str, list[np.ndarray]] = {"albedo": [], "sigma_deg": []}
+    for number, varied in enumerate(MORE):
+        found, loaded = varied.mapped(tmp_path / f"run {number}")
+        true = truth(found, loaded)
+        for name, cells in inside.items():
+            if varied.tile or name != "albedo":
+                cells.append(_inside(found, true, name))
+    for cells in inside.values():
+        assert 0.9 < np.mean(np.concatenate(cells)) < 0.995
+
+
+def test_an_even_sample_is_uniform_and_its_model_holds(tmp_path: Path) -> None:
+    loaded = Varied("halves", ONE, True, 5).loaded()
+    sample = loaded.protocol.simulated_sample
+    assert sample is not None
+    even = changed(loaded, simulated_sample=sample.model_copy(update={"variation": None}))
+    with Record.create(tmp_path / "run", {}) as record:
+        scan(even, record)
+        found = map_sample(record, even, "oren_nayar", 2.0)
+    assert found.uniform
+    assert found.rejected_share < 0.02
+    spread = found.spread("sigma_deg")
+    assert spread is not None
+    assert spread.median == pytest.approx(sample.parameters["sigma_deg"], abs=0.3)
+    assert np.isinf(found.height_mm[1])  # no texture shows it
+
+
+def test_a_run_without_frames_or_with_wrong_ones_is_refused(tmp_path: Path) -> None:
+    loaded = changed(shortest_scan(), keep_frames=True)
+    with Record.create(tmp_path / "bare", {}) as record:
+        bare = changed(loaded, keep_frames=False)
+        scan(bare, record)
+        with pytest.raises(InputError, match=r"bare: the frames of this run were not kept.*keep_f"):
+            map_sample(record, bare, "oren_nayar", 3.0)
+    with Record.create(tmp_path / "run", {}) as record:
+        scan(loaded, record)
+        with pytest.raises(InputError, match=r"cell_mm: 0.5 mm; allowed: 1.125 .* to 25.4 mm"):
+            map_sample(record, loaded, "oren_nayar", 0.5)
+        points = {r.step for r in record.readings() if r.kind == "point"}
+        name = next(n for n in record.frame_files() if int(n[7:13]) in points)
+        path = record.folder / name
+        cv2.imwrite(str(path), np.zeros((4, 5), dtype=np.uint16))
+        with pytest.raises(InputError, match=rf"{name}: \(4, 5\), uint16; allowed: a TIFF of"):
+            map_sample(record, loaded, "oren_nayar", 3.0)
+        path.write_bytes(b"no picture")
+        with pytest.raises(InputError, match="no picture; allowed: a TIFF of"):
+            map_sample(record, loaded, "oren_nayar", 3.0)
+        path.unlink()
+        with pytest.raises(InputError, match=rf"1 of 16 frames .* are missing: {name}: put them"):
+            map_sample(record, loaded, "oren_nayar", 3.0)
+
+
+def test_bands_of_rows_give_the_same_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    varied = Varied("halves", ONE, True, 7)
+    loaded = varied.loaded()
+    with Record.create(tmp_path / "run", {}) as record:
+        scan(loaded, record)
+        whole = map_sample(record, loaded, "oren_nayar", 2.5)
+        monkeypatch.setattr("acquisition.results.maps.sample_map._MOST_BYTES", 4 * 13 * 20 * 6)
+        parts = map_sample(record, loaded, "oren_nayar", 2.5)
+    assert parts.height_mm == pytest.approx(whole.height_mm)
+    # Where a surface off the axis is moved, a band lacks its neighbours' rows: by microns of y.
+    same = np.isfinite(parts.values["sigma_deg"]) & np.isfinite(whole.values["sigma_deg"])
+    assert same.mean() > 0.6
+    assert parts.values["sigma_deg"][same] == pytest.approx(
+        whole.values["sigma_deg"][same], abs=0.05
+    )

@@ -1,0 +1,1 @@
+"""Simulated cells and samples, for tests of maps."""
