@@ -8,31 +8,34 @@ last one is measured, and no choice depends on how long that takes.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from acquisition.adaptive.aims import Aims
-from acquisition.adaptive.knowledge import Knowledge
+from acquisition.adaptive.knowledge import Knowledge, agreeing, corrections
 from acquisition.adaptive.layout import Layout
-from acquisition.adaptive.next_points import Costs, NextPoints
+from acquisition.adaptive.next_points import MOST, Costs, NextPoints, noise_parts
 from acquisition.design.assumed_sample import AssumedSample
 from acquisition.design.forecast import forecast
-from acquisition.plan.plan import Step
+from acquisition.plan.plan import Plan, Step
+from acquisition.plan.recorded_choice import steps_of
 from analysis.design.optimal import LACK_OF_FIT
 from analysis.design.space_filling import farthest_from
 from analysis.models import MODELS
+from instrument.config.axes import HandAxis
 from instrument.errors import InputError
-from instrument.geometry import BoolArray, Geometry
+from instrument.geometry import BoolArray, Geometry, IntArray
 from instrument.record.reading import Batch, Check, Reading
 
-FIRST, SECOND = 8, 4
+FIRST, SECOND = 8, 2
 """Points of the first two batches."""
 
-BATCH, PART = 4, 6
-"""Points of a later batch: at least so many, and at most one in so many of those before it."""
+BATCH = 6
+"""Points of a later batch; of one that follows two fits which agree, up to as many as before it."""
 
+_LEAST_RATIO = 0.8  # of the u of a fit over that of the forecast for the same points
 _ENTRY = 4  # points of the first batch at another setting of the lamp by hand
 
 Chosen = list[tuple[Step, str]]
@@ -76,23 +79,26 @@ class Chooser:
         done = {step.index for step in known_steps}
         chosen = np.array([step.index in done for step in self.points])
         if len(batches) < 2:
-            count = FIRST if not batches else SECOND
-            return Proposal(points=self._spread(chosen, self._current(known_steps), count))
+            return Proposal(points=self._opening(chosen, known_steps))
         earlier = {step.index for step in self.steps(batches[:-1])}
         seen = [reading for reading in readings if reading.step in earlier]
         known = Knowledge.of(seen, checks, self.layout.loaded, self.aims)
         measured = np.array([step.index in earlier for step in self.points])
-        size = max(BATCH, int(chosen.sum()) // PART)
+        agree = known.model and agreeing(batches[-1], known.model, known.verdict)
+        size = max(BATCH, int(chosen.sum()) if agree else 0)
+        spread = [why for batch in batches for why in batch.reasons].count(LACK_OF_FIT)
         if known.leading is not None:
             try:
-                return self._informed(known, chosen, measured, known_steps, size)
+                return self._informed(
+                    known, chosen, measured, known_steps, (size, spread), corrections(batches)
+                )
             except (InputError, ValueError):
                 pass  # the model found so far foretells no light at all: spread on
-        return Proposal(known=known, points=self._spread_on(chosen, known_steps, size))
+        return Proposal(known=known, points=self._spread_on(chosen, known_steps, BATCH))
 
     def steps(self, batches: Sequence[Batch]) -> list[Step]:
         """Return the steps of batches, in order."""
-        return [self.layout.plan.steps[index] for batch in batches for index in batch.steps]
+        return [step for batch in batches for step in steps_of(self.layout.plan, batch)]
 
     @cached_property
     def reachable(self) -> BoolArray:
@@ -119,6 +125,18 @@ class Chooser:
             found.append(point)
         return [(self.points[k], LACK_OF_FIT) for k in found]
 
+    def _opening(self, chosen: BoolArray, known: Sequence[Step]) -> Chosen:
+        """Return the first part of points that are spread over all; then, the rest of them.
+
+        Parts in the order of measuring, so that the lamp need not turn back for the second one.
+        """
+        here, none = self._current(known), np.zeros(chosen.size, dtype=bool)
+        points = [step for step, _ in self._spread(none, here, FIRST + SECOND)]
+        way = self.layout.way((), points) or points
+        part = way[FIRST:] if known else way[:FIRST]
+        done = {step.index for step in known}
+        return [(step, LACK_OF_FIT) for step in part if step.index not in done]
+
     def _spread_on(self, chosen: BoolArray, known: Sequence[Step], size: int) -> Chosen:
         """Return points at the present setting of the lamp by hand, else at the next one."""
         here = self._current(known)
@@ -140,27 +158,37 @@ class Chooser:
         chosen: BoolArray,
         measured: BoolArray,
         steps: Sequence[Step],
-        size: int,
+        counts: tuple[int, int],
+        factors: Mapping[str, float],
     ) -> Proposal:
         leading, layout = known.leading, self.layout
         if leading is None:
             raise ValueError("no model to forecast with")
         model = MODELS[leading.model]
         x = np.array([leading.values[p.name] for p in model.parameters])
-        every = forecast(layout.loaded, layout.plan, AssumedSample(model, x, "the fit so far"))
+        sample = AssumedSample(model, x, "the fit so far")
+        every = forecast(layout.loaded, layout.plan, sample)
+        longest = forecast(layout.loaded, _with_frames(layout.plan, MOST), sample)
         used = every.used
         costs = self._costs(steps, used)
-        choice = NextPoints(every, costs, chosen[used], known, self.aims)
-        by_design = choice.u(measured[used])
+        choice = NextPoints(
+            every,
+            noise_parts(every, longest),
+            costs,
+            self._multiples(steps)[used],
+            known,
+            self.aims,
+        )
+        by_design = choice.u_measured(measured[used])
         fitted = {name: leading.u.get(name) for name in self.aims.u}
         # Errors that the fit sees beside those of the forecast stay in their ratio.
         ratio = {
-            name: 1.0 if u is None else max(u / by_design[name], 1.0) for name, u in fitted.items()
+            name: 1.0 if u is None else max(u / by_design[name], _LEAST_RATIO)
+            for name, u in fitted.items()
         }
-        floor = choice.u(np.ones(int(used.sum()), dtype=bool))
-        ahead = choice.u(chosen[used])
-        scale = {name: ratio[name] / self.aims.u[name] for name in self.aims.u}
-        points = self._best(choice, used, chosen, steps, size, scale)
+        floor, ahead = choice.u_floor(), choice.u_measured(chosen[used])
+        full = {name: own * factors.get(name, 1.0) for name, own in ratio.items()}
+        points = self._best(choice, used, chosen, steps, counts, full)
         return Proposal(
             known=known,
             points=points,
@@ -175,23 +203,35 @@ class Chooser:
         used: BoolArray,
         chosen: BoolArray,
         steps: Sequence[Step],
-        size: int,
-        scale: Mapping[str, float],
+        counts: tuple[int, int],
+        ratio: Mapping[str, float],
     ) -> Chosen:
-        """Return the best points here; those of a later setting by hand if they teach more."""
+        """Return the best points here; those of a later setting by hand if they teach more.
+
+        counts: points of the batch at most, and of those for lack of fit so far. ratio: u of the
+        fit over that of the forecast.
+        """
         usable = np.flatnonzero(used)
         here = (self._current(steps) & ~chosen)[used]
-        found, best = choice.pick(size, here, scale) if here.any() else ([], -1.0)
+        found, best = choice.pick(*counts, here, ratio) if here.any() else ([], -1.0)
         at = None
         for block in self._later(steps):
             allowed = self._at(block)[used]
             if allowed.any():
-                picked, rate = choice.pick(size, allowed, scale)
+                picked, rate = choice.pick(*counts, allowed, ratio)
                 if rate > best:
                     found, best, at = picked, rate, block
         if at is not None:  # begin there with points that show a lack of fit
             return self._spread(chosen, self._at(at), _ENTRY)
-        return [(self.points[usable[k]], reason) for k, reason in found]
+        return [
+            (replace(step, frames=step.frames * pick.multiple), pick.reason)
+            for step, pick in ((self.points[usable[pick.candidate]], pick) for pick in found)
+        ]
+
+    def _multiples(self, known: Sequence[Step]) -> IntArray:
+        """Frames of each candidate (N,) in units of the protocol's, as a ratio; 0 if not chosen."""
+        frames = {step.index: step.frames for step in known}
+        return np.array([frames.get(s.index, 0) // s.frames for s in self.points], dtype=np.int64)
 
     def _costs(self, known: Sequence[Step], used: BoolArray) -> Costs:
         """Return the bench time of the candidates in `used` (N,), from the present pose."""
@@ -210,8 +250,27 @@ class Chooser:
                 tiles = layout.batch([step], known)
                 way_s[k] = layout.seconds(tiles, known) - layout.frames_s(step)
         camera_s = float(np.median([_camera_s(step) for step in self.points]))
-        point_s = camera_s + np.array([layout.frames_s(step) for step in points])
-        return Costs(point_s=point_s, way_s=way_s, setting=own.reshape(-1).astype(np.int64))
+        return Costs(
+            move_s=np.full(len(points), camera_s),
+            frames_s=np.array([layout.frames_s(step) for step in points]),
+            way_s=way_s,
+            setting=own.reshape(-1).astype(np.int64),
+            view_deg=np.array([step.pose.theta_r for step in points]),
+            here_deg=here.theta_r,
+            per_deg_s=self._per_deg_s,
+        )
+
+    @cached_property
+    def _per_deg_s(self) -> float:
+        """Time of a degree that the camera turns, in s; none for one that is set by hand."""
+        axis = self.layout.rig.axes.theta_r
+        return 0.0 if isinstance(axis, HandAxis) else 1 / axis.speed_deg_per_s
+
+
+def _with_frames(plan: Plan, times: int) -> Plan:
+    """Return the plan with so many times the frames at every step."""
+    steps = (replace(step, frames=times * step.frames) for step in plan.steps)
+    return replace(plan, steps=tuple(steps))
 
 
 def _camera_s(step: Step) -> float:

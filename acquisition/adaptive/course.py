@@ -81,6 +81,7 @@ class Course:
         batch = Batch(
             number=self._batches[-1].number + 1 if self._batches else 0,
             steps=tuple(step.index for step in lost),
+            frames=tuple(step.frames for step in lost),
             reasons=(_UNKNOWN,) * len(lost),
         )
         self._add(batch)
@@ -160,6 +161,7 @@ class Course:
         return Batch(
             number=self._batches[-1].number + 1 if self._batches else 0,
             steps=tuple(step.index for step in steps),
+            frames=tuple(step.frames for step in steps),
             reasons=tuple(reasons.get(step.index, REFERENCE) for step in steps),
             model=known.model,
             verdict=known.verdict,
@@ -190,14 +192,14 @@ class Course:
         steps = self._chooser.layout.plan.steps
         chosen = {index for batch in self._batches for index in batch.steps}
         readings = sorted(self._record.readings(), key=lambda reading: reading.time_s)
-        lost = [r.step for r in readings if r.step not in chosen]
+        lost = {r.step: r.frames for r in readings if r.step not in chosen}
         beyond = [index for index in (*chosen, *lost) if index >= len(steps)]
         if beyond:
             raise InputError(
                 f"{self._record.folder}: step {beyond[0]} is measured or chosen, of the "
                 f"{len(steps)} of its protocol: take an undamaged copy of the run"
             )
-        return [steps[index] for index in lost]
+        return [replace(steps[index], frames=frames) for index, frames in lost.items()]
 
 
 def chooser_of(loaded: Loaded, plan: Plan) -> Chooser:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from acquisition.adaptive.aims import Aims
 from acquisition.adaptive.chooser import Proposal
-from analysis.choice.ladder import physics
+from acquisition.adaptive.knowledge import agreeing, corrections
 from instrument.record.reading import Batch
 
 _NEAR = 1.05  # u, in units of that by all candidates, from which on more bench time is no help
@@ -17,11 +17,8 @@ U = Mapping[str, float | None]
 
 def stable(batches: Sequence[Batch], proposal: Proposal) -> bool:
     """Return True if the last two fits chose the same model, with the same verdict."""
-    last, known = batches[-1], proposal.known
-    return bool(known.model) and (physics(last.model), last.verdict) == (
-        physics(known.model),
-        known.verdict,
-    )
+    known = proposal.known
+    return bool(known.model) and agreeing(batches[-1], known.model, known.verdict)
 
 
 def expected(batches: Sequence[Batch], proposal: Proposal) -> dict[str, float | None]:
@@ -29,15 +26,11 @@ def expected(batches: Sequence[Batch], proposal: Proposal) -> dict[str, float | 
 
     They average the models over lamp and lens, and correct for what quick fits leave out.
     """
-    found = dict(proposal.forecast)
-    checks = [batch for batch in batches if batch.checked]
-    for name, u in found.items():
-        full, quick = (
-            (checks[-1].checked.get(name), checks[-1].forecast.get(name)) if checks else (None,) * 2
-        )
-        if u is not None and full is not None and quick:
-            found[name] = u * max(full / quick, 1.0)
-    return found
+    factors = corrections(batches)
+    return {
+        name: None if u is None else u * factors.get(name, 1.0)
+        for name, u in proposal.forecast.items()
+    }
 
 
 def no_help(batches: Sequence[Batch], proposal: Proposal, aims: Aims) -> str:

@@ -9,10 +9,11 @@ from acquisition.adaptive.aims import Aims
 from acquisition.results.fitting import fit_run, measurements
 from acquisition.results.reduction import reduced_rows
 from analysis.choice.choice import Choice, choose
+from analysis.choice.ladder import physics
 from analysis.fit.fit import FitResult
 from instrument.config.load import Loaded
 from instrument.errors import GonioError
-from instrument.record.reading import Check, Reading, Rows
+from instrument.record.reading import Batch, Check, Reading, Rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,20 @@ class Knowledge:
         """Return the u of each parameter asked for; None where the chosen model gives none."""
         best = None if self.choice is None else self.choice.best
         return {name: None if best is None else best.u.get(name) for name in aims.u}
+
+
+def agreeing(batch: Batch, model: str, verdict: str) -> bool:
+    """Return True if the fit that a batch was based on chose the same physics, the same verdict."""
+    return (physics(batch.model), batch.verdict) == (physics(model), verdict)
+
+
+def corrections(batches: Sequence[Batch]) -> dict[str, float]:
+    """Return the ratio of the last full fit's u to what had been forecast, 1 or more, by name."""
+    last = next((batch for batch in reversed(batches) if batch.checked), None)
+    if last is None:
+        return {}
+    pairs = ((n, full, last.forecast.get(n)) for n, full in last.checked.items())
+    return {name: max(full / quick, 1.0) for name, full, quick in pairs if full and quick}
 
 
 def full_fit(rows: Rows, loaded: Loaded, aims: Aims) -> tuple[str, Mapping[str, float | None]]:

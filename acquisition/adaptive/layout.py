@@ -49,7 +49,7 @@ class Layout:
             found += self.closing(known)
         if all(step.block != block for step in known):
             found += self._tiles(block, known)
-        way = self._way([*known, *found], points)
+        way = self.way([*known, *found], points)
         for point in way:
             found += self._drift_due([*known, *found], block)
             found.append(point)
@@ -98,16 +98,42 @@ class Layout:
     def _end(self, known: Sequence[Step]) -> Pose:
         return known[-1].pose if known else home_pose(self.rig)
 
-    def _way(self, known: Sequence[Step], points: Iterable[Step]) -> list[Step]:
-        """Return the points in order, each the quickest to reach from the one before it."""
-        left, found, pose = list(points), list[Step](), self._end(known)
-        while left:
-            taken = min(left, key=lambda step: (self.moves_s(pose, step.pose), step.index))
-            if self.moves_s(pose, taken.pose) == float("inf"):
-                break
-            found.append(taken)
-            left.remove(taken)
-            pose = taken.pose
+    def way(self, known: Sequence[Step], points: Iterable[Step]) -> list[Step]:
+        """Return the points in an order that is quick to measure, from where the rig stands.
+
+        One setting of the lamp after the other, the nearest first, and the views of each rising or
+        falling. Points to which no way leads are left out.
+        """
+        settings: dict[int, list[Step]] = {}
+        for point in sorted(points, key=lambda step: (step.pose.theta_r, step.index)):
+            settings.setdefault(point.lamp_setting, []).append(point)
+        found, pose = list[Step](), self._end(known)
+        while settings:
+            orders = [order for own in settings.values() for order in (own, own[::-1])]
+            here = pose
+            taken = min(orders, key=lambda order: self._reaching_s(here, order))
+            reached = self._reached(pose, taken)
+            found += reached
+            pose = reached[-1].pose if reached else pose
+            del settings[taken[0].lamp_setting]
+        return found
+
+    def _reaching_s(self, start: Pose, order: Sequence[Step]) -> tuple[float, float]:
+        """Return the lamp's time to the setting of an order, and the time of all its moves."""
+        lamp = self.moves_s(start, order[0].pose._replace(theta_r=start.theta_r))
+        total = 0.0
+        for step in order:
+            total += self.moves_s(start, step.pose)
+            start = step.pose
+        return lamp, total
+
+    def _reached(self, start: Pose, order: Sequence[Step]) -> list[Step]:
+        """Return the steps of an order to which a way leads from the one before."""
+        found = list[Step]()
+        for step in order:
+            if self.moves_s(start, step.pose) < float("inf"):
+                found.append(step)
+                start = step.pose
         return found
 
     def _tiles(self, block: int, known: Sequence[Step]) -> list[Step]:

@@ -1,11 +1,14 @@
 """Next points of an adaptive scan: those that teach most in each second of bench time.
 
-Of each batch one point at least is for lack of fit, the farthest from all before it; one may tell
-the leading models apart; the others lower the u of the parameters asked for.
+One point of a batch may tell the leading models apart; as many as make up a fifth of the scan are
+for lack of fit, the farthest from all before them; the others lower the u of the parameters asked
+for. Where noise is most of what is left, these take more frames: that costs less than the way to
+another point.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -15,100 +18,245 @@ from acquisition.adaptive.aims import MARGIN, Aims
 from acquisition.adaptive.knowledge import Knowledge
 from acquisition.design.forecast import Forecast
 from analysis.choice.ladder import physics
-from analysis.design.optimal import LACK_OF_FIT, RIVALS
-from analysis.design.posterior import Posterior
-from analysis.design.rivals import MOST, Rival
+from analysis.design.information import Information
+from analysis.design.optimal import LACK_OF_FIT, RIVALS, SHARE
+from analysis.design.rivals import MOST as MOST_RIVALS
+from analysis.design.rivals import Rival
 from analysis.design.space_filling import farthest_from
 from analysis.fit.fit import FitResult
 from instrument.geometry import BoolArray, FloatArray, IntArray
 
+MOST = 8
+"""Most frames of a point, in units of the protocol's."""
+
 _TOLD = 100.0  # chi2, to first order, beyond which a point more need not tell two models apart
 _LEAST = 2  # points of a batch, even where fewer may reach the goal
+_STEP, _SEARCHES = 1.5, 12  # of the search for the best count
+_SMALL = 0.02  # share of a point in units of the largest, below which it is left out
+_ROUNDS = 25  # of the weights, for each count
+
+
+@dataclass(frozen=True, slots=True)
+class Pick:
+    """Chosen candidate with its reason and its frames, in units of the protocol's."""
+
+    candidate: int
+    reason: str
+    multiple: int = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Costs:
-    """Bench time of N candidates: its own point_s (N,), and way_s (M,) to each lamp setting.
+    """Bench time of N candidates: usual move_s and frames_s (N,), and way_s (M,) to each setting.
 
-    setting: (N,), number of each candidate's setting; here: the one at which the lamp stands.
+    setting: (N,), number of each candidate's setting of the lamp. view_deg: (N,), its view angle;
+    here_deg: that at which the camera stands. per_deg_s: time of a degree that the camera turns.
     """
 
-    point_s: FloatArray
+    move_s: FloatArray
+    frames_s: FloatArray
     way_s: FloatArray
     setting: IntArray
+    view_deg: FloatArray
+    here_deg: float
+    per_deg_s: float
 
-    def one_more_s(self, batch: BoolArray) -> FloatArray:
-        """Return the time (N,) in s that each candidate would add to a batch, a mask (N,)."""
-        way_s = self.way_s.copy()
-        way_s[self.setting[batch]] = 0.0
-        return np.asarray(self.point_s + way_s[self.setting])
+    def alone_s(self, multiples: IntArray) -> FloatArray:
+        """Return the time (N,) in s of points with so many frames (N,), without their ways."""
+        return np.asarray(self.move_s + multiples * self.frames_s)
+
+    def one_more_s(self, batch: BoolArray, multiple: int = 1) -> FloatArray:
+        """Return the time (N,) in s that each candidate would add to a batch, a mask (N,).
+
+        The views of a setting are measured in one go: one between them adds no way of its own.
+        """
+        way_s, outside_deg = self.way_s.copy(), np.zeros(self.view_deg.size)
+        for number in range(way_s.size):
+            own, taken = self.setting == number, batch & (self.setting == number)
+            ends = self.view_deg[taken] if taken.any() else np.array([self.here_deg])
+            way_s[number] *= not taken.any()
+            below, above = ends.min() - self.view_deg[own], self.view_deg[own] - ends.max()
+            outside_deg[own] = np.maximum(np.maximum(below, above), 0.0)
+        point_s = self.move_s + multiple * self.frames_s
+        return np.asarray(point_s + way_s[self.setting] + self.per_deg_s * outside_deg)
+
+
+def noise_parts(every: Forecast, longest: Forecast) -> FloatArray:
+    """Return the part (N,) of each candidate's independent variance that frames average, 0 to 1.
+
+    every, longest: forecasts of the same points with the protocol's frames, and with `MOST` times.
+    """
+    one, most = (np.square(f.problem.covariance.u_independent) for f in (every, longest))
+    return np.clip((1 - most / one) * MOST / (MOST - 1), 0.0, 1.0)
 
 
 class NextPoints:
-    """Choice among the N candidates of a forecast for the leading model, given those chosen."""
+    """Choice among the N candidates of a forecast for the leading model, given those chosen.
+
+    noise: (N,), part of the variance that frames average. multiples: (N,), frames of those chosen
+    in units of the protocol's, as a ratio, 0 of the others.
+    """
 
     def __init__(
-        self, every: Forecast, costs: Costs, chosen: BoolArray, known: Knowledge, aims: Aims
+        self,
+        every: Forecast,
+        noise: FloatArray,
+        costs: Costs,
+        multiples: IntArray,
+        known: Knowledge,
+        aims: Aims,
     ) -> None:
         self.every, self._costs, self._aims = every, costs, aims
+        self._noise, self._multiples = noise, multiples
         self._information = every.information
         self._weights = self._information.weights(aims.u, aims.u)
-        self._chosen = chosen
+        self._chosen = multiples > 0
+        self._once = self._information.rows
+        own = self._by_frames(1)
+        self._known = own.matrix(self._chosen.astype(np.float64))
         self._rivals = list(_rivals(known, every))
         self.asked = [n for n in self._information.names if n in aims.u]
 
-    def u(self, design: BoolArray) -> dict[str, float]:
-        """Return the u, in its unit, of each parameter asked for by a design, a mask (N,)."""
-        found = self._information.u(design.astype(np.float64))
+    def u_measured(self, design: BoolArray) -> dict[str, float]:
+        """Return the u, in its unit, of each parameter asked for by chosen points, a mask (N,)."""
+        return self._u(self._by_frames(1), design)
+
+    def u_floor(self) -> dict[str, float]:
+        """Return the u, in its unit, by every candidate with the most frames."""
+        return self._u(self._by_frames(MOST), np.ones(self._chosen.size, dtype=bool))
+
+    def _u(self, information: Information, design: BoolArray) -> dict[str, float]:
+        found = information.u(design.astype(np.float64))
         return {name: found[name] for name in self.asked}
 
+    def _by_frames(self, multiple: int) -> Information:
+        """Information where points that are not chosen yet have so many times the frames."""
+        times = np.where(self._chosen, np.maximum(self._multiples, 1), multiple)
+        smaller = np.sqrt(self._noise / times + 1 - self._noise)
+        rows = self._information.rows / smaller[:, np.newaxis]
+        return replace(self._information, rows=rows)
+
     def pick(
-        self, size: int, allowed: BoolArray, scale: Mapping[str, float]
-    ) -> tuple[list[tuple[int, str]], float]:
-        """Return up to `size` candidates, of those allowed (N,), each with its reason.
+        self, size: int, spread: int, allowed: BoolArray, ratio: Mapping[str, float]
+    ) -> tuple[list[Pick], float]:
+        """Return up to `size` candidates, of those allowed (N,), with reasons and frames.
 
-        And the decrease of the sum of squared u, in units of those wanted, per second. scale:
-        factor on the forecast u of each parameter; where they reach the goal, the batch ends.
+        And the logarithm by which they lower the sum of squared u, in units of those wanted, per
+        second. spread: points for lack of fit so far. ratio: factor on the forecast u of each
+        parameter; beyond the goal nothing counts.
         """
-        posterior = Posterior(self._information, self._weights, self._chosen)
-        batch, found, spent_s, before = np.zeros(allowed.size, bool), [], 0.0, posterior.criterion
-        for point, reason in self._picks(size, allowed, posterior, batch):
-            spent_s += float(self._costs.one_more_s(batch)[point])
-            batch[point] = True
-            posterior.add(point)
-            found.append((point, reason))
-            if len(found) >= _LEAST and self._enough(posterior, scale):
-                break
-        gained = max(before - posterior.criterion, 0.0)
-        return found, gained / spent_s if spent_s > 0 else 0.0
-
-    def _picks(
-        self, size: int, allowed: BoolArray, posterior: Posterior, batch: BoolArray
-    ) -> Iterator[tuple[int, str]]:
-        """Yield candidates; each is in the posterior and in the batch when the next is asked."""
-        spread = farthest_from(self.every.measurements.geometry, self._chosen, allowed)
-        if spread is None:
-            return
-        yield spread, LACK_OF_FIT
-        apart = self._telling(allowed & ~posterior.chosen, batch) if size > _LEAST else None
+        times, rate = self._times(size, allowed, ratio)
+        reasons = self._reasons(times)
+        apart = self._telling(allowed & ~self._chosen & (times == 0), allowed & False)
         if apart is not None:
-            yield apart, RIVALS
-        for _ in range(size - 1 - (apart is not None)):
-            free = allowed & ~posterior.chosen
-            if not free.any():
+            reasons[apart] = RIVALS
+        self._spread(reasons, spread, allowed)
+        return [Pick(k, why, max(int(times[k]), 1)) for k, why in reasons.items()], rate
+
+    def _times(
+        self, size: int, allowed: BoolArray, ratio: Mapping[str, float]
+    ) -> tuple[IntArray, float]:
+        """Return the frames (N,) of the best further points, in units of the protocol's, a ratio.
+
+        Of the best weights of designs that add to what is chosen (`analysis.design.bound`), the
+        count for which u falls most per second, on the way to the goal; 0 for the others.
+        """
+        free = allowed & ~self._chosen
+        share, count = free / max(free.sum(), 1), float(_LEAST)
+        target = self._target(ratio)
+        way = math.log(max(self._criterion(np.zeros(free.size, dtype=np.int64)) / target, 1.0))
+        found = [(np.zeros(free.size, dtype=np.int64), -1.0)]
+        for _ in range(_SEARCHES if free.any() else 0):
+            share = self._better(share, count)
+            times = self._pruned(_rounded(share, count, size), target)
+            left = math.log(max(self._criterion(times) / target, 1.0))
+            found.append((times, (way - left) / self._spent_s(times)))
+            if left == 0:
+                break
+            count *= _STEP
+        return max(found, key=lambda pair: pair[1])
+
+    def _pruned(self, times: IntArray, target: float) -> IntArray:
+        """Return fewer points, with frames (N,) as a ratio, that still reach a sum of squared u.
+
+        Those go first whose time gains least. Points that do not reach it are returned as they are.
+        """
+        if self._criterion(times) > target:
+            return times
+        kept, columns = times.copy(), np.flatnonzero(self._weights)
+        while np.count_nonzero(kept) > 1:
+            more = self._information_of(kept)
+            inverse = np.linalg.inv(self._known + self._added(more))
+            own = np.flatnonzero(kept)
+            rows = self._once[own] * np.sqrt(more[own])[:, np.newaxis]
+            seen = rows @ inverse
+            rest = np.maximum(1 - np.sum(seen * rows, axis=1), 1e-9)
+            lost = (np.square(seen[:, columns]) @ self._weights[columns]) / rest
+            now = float(np.diag(inverse)[columns] @ self._weights[columns])
+            least = int(np.argmin(lost / self._costs.alone_s(kept)[own]))
+            if now + lost[least] > target:
+                break
+            kept[own[least]] = 0
+        return kept
+
+    def _information_of(self, times: IntArray) -> FloatArray:
+        """Weights (N,) of further points in the information, as a ratio: what frames average."""
+        averaged = self._noise / np.maximum(times, 1) + 1 - self._noise
+        return np.where(times > 0, 1 / averaged, 0.0)
+
+    def _target(self, ratio: Mapping[str, float]) -> float:
+        """Return the sum of squared u, in units of those wanted, at which each may be reached."""
+        return sum((MARGIN / ratio[name]) ** 2 for name in self.asked)
+
+    def _better(self, share: FloatArray, count: float) -> FloatArray:
+        """Improve the shares (N,), of a sum of 1 and as a ratio, of a design of so many points."""
+        asked = np.flatnonzero(self._weights)
+        root = np.sqrt(self._weights[asked])
+        for _ in range(_ROUNDS):
+            inverse = np.linalg.inv(self._known + self._added(count * share))[:, asked] * root
+            share = share * np.sqrt(np.square(self._once @ inverse).sum(axis=1))
+            share = share / share.sum()
+        return share
+
+    def _added(self, weights: FloatArray) -> FloatArray:
+        """Information (unknowns, unknowns) of further points, with weights (N,) as a ratio."""
+        return np.asarray((self._once * weights[:, np.newaxis]).T @ self._once)
+
+    def _parts(self, times: IntArray) -> dict[str, float]:
+        """Return the u of each parameter in units of that wanted, with further frames (N,)."""
+        inverse = np.linalg.inv(self._known + self._added(self._information_of(times)))
+        variance = np.diag(inverse)
+        names = self._information.names
+        return {n: float(np.sqrt(variance[k] * self._weights[k])) for k, n in enumerate(names)
+                if n in self.asked}  # fmt: skip
+
+    def _criterion(self, times: IntArray) -> float:
+        return sum(part**2 for part in self._parts(times).values())
+
+    def _reasons(self, times: IntArray) -> dict[int, str]:
+        """Return the parameter that each further point is for: whose variance it lowers most."""
+        inverse = np.linalg.inv(self._known + self._added((times > 0).astype(np.float64)))
+        columns = [self._information.names.index(name) for name in self.asked]
+        part = np.square(self._once @ inverse[:, columns]) / np.diag(inverse)[columns]
+        return {int(k): self.asked[int(np.argmax(part[k]))] for k in np.flatnonzero(times)}
+
+    def _spread(self, reasons: dict[int, str], spread: int, allowed: BoolArray) -> None:
+        """Add points for lack of fit, until they are a fifth of all: the farthest from others."""
+        taken, geometry = self._chosen.copy(), self.every.measurements.geometry
+        taken[list(reasons)] = True
+        while spread < SHARE * taken.sum():
+            far = farthest_from(geometry, taken, allowed)
+            if far is None:
                 return
-            gain = (posterior.criterion - posterior.with_one_more()) / self._costs.one_more_s(batch)
-            best = int(np.argmax(np.where(free, gain, -np.inf)))
-            yield best, self._reason(posterior, best)
+            taken[far], reasons[far], spread = True, LACK_OF_FIT, spread + 1
 
-    def _reason(self, posterior: Posterior, point: int) -> str:
-        """Return the parameter whose variance a candidate lowers most, as a part of it."""
-        part = np.square(posterior.cross[point]) / posterior.variance
-        return self.asked[int(np.argmax(part))]
-
-    def _enough(self, posterior: Posterior, scale: Mapping[str, float]) -> bool:
-        u = dict(zip(self.asked, np.sqrt(posterior.variance).tolist(), strict=True))
-        return all(scale[name] * u[name] <= MARGIN for name in self.asked)
+    def _spent_s(self, times: IntArray) -> float:
+        """Return the time of further points with so many frames (N,), as a ratio."""
+        batch, spent_s = np.zeros(self._chosen.size, dtype=bool), 0.0
+        for point in np.flatnonzero(times):
+            spent_s += float(self._costs.one_more_s(batch, int(times[point]))[point])
+            batch[point] = True
+        return spent_s
 
     def _telling(self, free: BoolArray, batch: BoolArray) -> int | None:
         """Return the candidate that tells the closest rival best; None where all are told apart."""
@@ -122,6 +270,18 @@ class NextPoints:
         return None
 
 
+def _rounded(share: FloatArray, count: float, size: int) -> IntArray:
+    """Return whole numbers of frames (N,), as a ratio, for the `size` largest shares (N,) at most.
+
+    What the smaller ones would have is theirs.
+    """
+    largest = np.argsort(-share, kind="stable")[:size]
+    kept = largest[share[largest] >= _SMALL * share[largest[0]]]
+    times = np.zeros(share.size, dtype=np.int64)
+    times[kept] = np.clip(np.round(count * share[kept] / share[kept].sum()), 1, MOST)
+    return times
+
+
 def _rivals(known: Knowledge, every: Forecast) -> Iterator[Rival]:
     """Yield the other candidates that describe the readings best, those of other physics."""
     if known.choice is None or known.leading is None or every.measurements.relative:
@@ -129,7 +289,7 @@ def _rivals(known: Knowledge, every: Forecast) -> Iterator[Rival]:
     own, seen = known.leading, {physics(known.leading.model)}
     others = sorted((c for c in known.choice.candidates if c.converged), key=lambda c: c.bic)
     for other in others:
-        if len(seen) > MOST:
+        if len(seen) > MOST_RIVALS:
             return
         if physics(other.model) not in seen and not _contains(other, own):
             seen.add(physics(other.model))

@@ -6,7 +6,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from acquisition.plan.plan import Plan, Step
-from instrument.record.reading import batches_of
+from instrument.record.reading import Batch, batches_of
+
+
+def steps_of(plan: Plan, batch: Batch) -> list[Step]:
+    """Return the steps of a batch, with its frames; those that the plan does not have left out."""
+    pairs = zip(batch.steps, batch.frames, strict=True)
+    own = ((plan.steps[index], frames) for index, frames in pairs if index < len(plan.steps))
+    return [replace(step, frames=frames) for step, frames in own]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,9 +34,8 @@ def with_recorded_choice(plan: Plan, events: Iterable[tuple[str, str, str]]) -> 
     Steps that the plan does not have are left out: a record may come from anybody.
     """
     batches = batches_of(events)
-    numbers = (index for batch in batches for index in batch.steps if index < len(plan.steps))
     chosen = RecordedChoice(
-        steps=tuple(plan.steps[index] for index in numbers),
+        steps=tuple(step for batch in batches for step in steps_of(plan, batch)),
         ended=bool(batches and batches[-1].end),
     )
     return replace(plan, choosing=chosen)

@@ -119,6 +119,9 @@ class Rows(NamedTuple):
     events: Sequence[tuple[str, str, str]]
 
 
+MOST_FRAMES = 100_000
+"""Frames of one step."""
+
 _MOST_STEP = 2**53
 _PLAIN = re.compile(r"([A-Za-z0-9][ -~]{0,99})?", re.ASCII)
 
@@ -128,7 +131,7 @@ class Batch:
     """Steps that a scan chose to measure next: the text of an event of the kind `chosen`.
 
     number: of the batch, from 0. steps: their numbers in the list of all, in the order in which
-    they are measured. reasons: one for each step. model, verdict: of the fit that the choice is
+    they are measured. frames, reasons: of each step. model, verdict: of the fit that the choice is
     based on, empty without one; fitted: u of the parameters asked for by that fit; forecast: what
     it would be after the batch before this one; checked: what a full fit then found, empty where
     none was made. In the parameters' units; None for a u that is not known. seconds: expected time
@@ -137,6 +140,7 @@ class Batch:
 
     number: int
     steps: tuple[int, ...]
+    frames: tuple[int, ...]
     reasons: tuple[str, ...]
     model: str = ""
     verdict: str = ""
@@ -163,9 +167,10 @@ class Batch:
         for name, allowed in _RULES.items():
             if not _FITS[allowed](data[name]):
                 raise ValueError(f"{name} is {str(data[name])[:40]!r}; allowed: {allowed}")
-        if len(data["reasons"]) != len(data["steps"]):
-            raise ValueError(f"{len(data['reasons'])} reasons for {len(data['steps'])} steps")
-        lists = {name: tuple(data[name]) for name in ("steps", "reasons")}
+        for name in ("frames", "reasons"):
+            if len(data[name]) != len(data["steps"]):
+                raise ValueError(f"{len(data[name])} {name} for {len(data['steps'])} steps")
+        lists = {name: tuple(data[name]) for name in ("steps", "frames", "reasons")}
         return cls(**{**data, **lists})
 
 
@@ -180,6 +185,10 @@ def _is_number(value: Any) -> bool:
 
 def _is_step(value: Any) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= _MOST_STEP
+
+
+def _is_count(value: Any) -> bool:
+    return _is_step(value) and 1 <= value <= MOST_FRAMES
 
 
 def _are_steps(value: Any) -> bool:
@@ -200,14 +209,17 @@ def _is_u(value: Any) -> bool:
 
 
 _STEP, _STEPS, _TEXT = "a whole number", "different whole numbers", "a text"
+_FRAMES = f"whole numbers from 1 to {MOST_FRAMES}"
 _TEXTS, _U, _SECONDS = "plain words in ASCII", "u by name, 0 or more, or null", "a number"
 _RULES = {
-    "number": _STEP, "steps": _STEPS, "reasons": _TEXTS, "model": _TEXT, "verdict": _TEXT,
-    "fitted": _U, "forecast": _U, "checked": _U, "seconds": _SECONDS, "end": _TEXT,
+    "number": _STEP, "steps": _STEPS, "frames": _FRAMES, "reasons": _TEXTS, "model": _TEXT,
+    "verdict": _TEXT, "fitted": _U, "forecast": _U, "checked": _U, "seconds": _SECONDS,
+    "end": _TEXT,
 }  # fmt: skip
 _FITS = {
     _STEP: _is_step,
     _STEPS: _are_steps,
+    _FRAMES: lambda value: isinstance(value, list) and all(map(_is_count, value)),
     _TEXT: lambda value: isinstance(value, str),
     _TEXTS: lambda value: isinstance(value, list) and all(map(_is_plain, value)),
     _U: _is_u,

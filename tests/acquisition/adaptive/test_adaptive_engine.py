@@ -58,6 +58,8 @@ def test_after_stops_at_random_steps_choices_and_readings_are_the_same(
     assert batches[-1].end.startswith("the goal is reached")
     steps = [index for batch in batches for index in batch.steps]
     assert sorted(steps) == [reading.step for reading in readings]
+    frames = {s: n for batch in batches for s, n in zip(batch.steps, batch.frames, strict=True)}
+    assert {reading.step: reading.frames for reading in readings} == frames
     assert len(readings) < len(chooser.layout.plan.steps)
     stops = np.random.default_rng(3).choice(len(steps) - 1, 3, replace=False)
     last = [batch.steps[-1] for batch in batches][1]  # between two batches, too

@@ -21,15 +21,13 @@ from tests.support.adaptive.predicted_bench import PredictedBench, adaptive_scan
 from tests.support.scans import changed
 
 
-@pytest.mark.parametrize("batches", [2, 3, 5])
+@pytest.mark.parametrize("batches", [2, 4])
 def test_readings_of_the_last_batch_do_not_matter(batches: int, tmp_path: Path) -> None:
     bench = PredictedBench(adaptive_scan("sigma_deg=0.01"), seed=batches)
     with bench.create(tmp_path / "run") as record:
-        steps = 0
         while len(batches_of(record.events())) < batches:
-            bench.run(record, steps)
-            steps += 1
-        bench.run(record, sum(len(b.steps) for b in batches_of(record.events())))
+            bench.run(record, len(record.readings()))  # chooses a batch
+            bench.run(record, sum(len(b.steps) for b in batches_of(record.events())))
         made, readings = batches_of(record.events()), record.readings()
     rng, last = np.random.default_rng(1), set(made[-1].steps)
     other = [
@@ -60,7 +58,7 @@ def test_the_first_two_batches_are_spread_over_the_list(tmp_path: Path) -> None:
         assert own[-1] > 60
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_every_way_is_clear_of_a_random_zone(seed: int, tmp_path: Path) -> None:
     """The lamp cannot turn from one incidence to the other while the camera is in it."""
     rng = np.random.default_rng(seed)

@@ -26,6 +26,7 @@ def _batches(draw: st.DrawFn) -> Batch:
     return Batch(
         number=draw(st.integers(0, 100)),
         steps=tuple(steps),
+        frames=draw(st.tuples(*[st.integers(1, 10_000)] * len(steps))),
         reasons=tuple(reasons),
         model=draw(st.text()),
         verdict=draw(st.text()),
@@ -43,7 +44,7 @@ def test_a_choice_is_read_as_it_was_written(batch: Batch) -> None:
     assert batches_of([("", CHOSEN, batch.text), ("", "other", "{}")]) == [batch]
 
 
-_GOOD = Batch(number=0, steps=(3, 1), reasons=("a", "b"), fitted={"albedo": 0.1})
+_GOOD = Batch(number=0, steps=(3, 1), frames=(4, 16), reasons=("a", "b"), fitted={"albedo": 0.1})
 _WRONG: list[tuple[str, Any, str]] = [
     ("steps", [1, 1], "steps is '[1, 1]'; allowed: different whole numbers"),
     ("steps", [-1, 2], "steps"),
@@ -51,6 +52,8 @@ _WRONG: list[tuple[str, Any, str]] = [
     ("steps", [True, 2], "steps"),
     ("steps", 3, "steps"),
     ("number", "0", "number is '0'; allowed: a whole number"),
+    ("frames", [4], "1 frames for 2 steps"),
+    ("frames", [4, 0], "frames is '[4, 0]'; allowed: whole numbers from 1"),
     ("reasons", ["a"], "1 reasons for 2 steps"),
     ("reasons", ["a", 2], "reasons"),
     ("reasons", ["=1+1", "b"], "reasons is"),
@@ -87,7 +90,7 @@ def test_a_text_that_is_no_choice_is_refused(text: str) -> None:
 def test_choices_that_contradict_one_another_are_refused(
     number: int, steps: tuple[int, ...], words: str, tmp_path: Path
 ) -> None:
-    other = Batch(number=number, steps=steps, reasons=("",) * len(steps))
+    other = Batch(number=number, steps=steps, frames=(4,) * len(steps), reasons=("",) * len(steps))
     with Record.create(tmp_path / "run", {}) as record:
         for batch in (_GOOD, other):
             record.add_event("", CHOSEN, batch.text)

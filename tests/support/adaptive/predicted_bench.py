@@ -67,8 +67,7 @@ class PredictedBench:
         self.plan = make_plan(loaded)
         self.chooser = chooser or chooser_of(loaded, self.plan)
         self._model, self._parameters = MODELS[sample[0]], dict(sample[1])
-        predicted = PredictedReadings(loaded, self._brdf).of(self.plan)
-        self._readings = [self._drawn(reading) for reading in predicted]
+        self._predicted = PredictedReadings(loaded, self._brdf).of(self.plan)
 
     def create(self, folder: Path) -> Record:
         """Create the record of a run, as `gonio run` does."""
@@ -88,12 +87,21 @@ class PredictedBench:
         record.set_meta("steps", str(len(plan.known)))
         return plan
 
+    def all_readings(self) -> list[Reading]:
+        """Return the readings of all steps, in the order of the list."""
+        times = [step.start_s + step.duration_s for step in self.plan.steps]
+        return [
+            replace(self._drawn(r, r.frames), time_s=t, free_s=t)
+            for r, t in zip(self._predicted, times, strict=True)
+        ]
+
     def reading(self, step: Step, record: Record) -> Reading:
         """Return the reading of a step, at the time when the scan comes to it."""
         made = max(record.readings(), key=lambda r: r.time_s, default=None)
         begun_s, before = (0.0, []) if made is None else (made.free_s, [self.plan.steps[made.step]])
         end_s = begun_s + self.chooser.layout.seconds([step], before)
-        return replace(self._readings[step.index], time_s=end_s, free_s=end_s)
+        drawn = self._drawn(self._predicted[step.index], step.frames)
+        return replace(drawn, time_s=end_s, free_s=end_s)
 
     def _brdf(self, geometry: Geometry) -> FloatArray:
         return np.asarray(self._model.brdf(geometry, **self._parameters))
@@ -103,7 +111,9 @@ class PredictedBench:
         words = [self._seed, *repr(key).encode()]
         return float(np.random.default_rng(words).standard_normal())
 
-    def _drawn(self, r: Reading) -> Reading:
+    def _drawn(self, r: Reading, frames: int) -> Reading:
+        u_noise_dn = r.u_noise_dn * np.sqrt(r.frames / frames)
+        r = replace(r, frames=frames, u_noise_dn=float(u_noise_dn))
         own = [r.u_noise_dn, r.u_quantisation_dn, r.u_texture_dn]
         signal = r.signal_dn * self._by_angles(r) * self._by_tile(r)
         signal += sum(u * self._random("own", r.step, n) for n, u in enumerate(own))

@@ -1,0 +1,148 @@
+"""An adaptive scan and the even sweep of 5 degrees on the same bench, for the same u of sigma."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.adaptive.aims import Aims
+from acquisition.adaptive.candidate_list import candidate_list, with_goal
+from acquisition.adaptive.chooser import Chooser
+from acquisition.adaptive.layout import Layout
+from acquisition.plan.plan import Step, make_plan
+from acquisition.results.fitting import measurements
+from acquisition.results.reduction import reduced_rows
+from analysis.choice.choice import Choice, choose
+from analysis.choice.ladder import physics
+from instrument.config.load import Loaded
+from instrument.record.reading import Rows, batches_of
+from tests.support.adaptive.predicted_bench import PredictedBench
+from tests.support.random_plans import base
+from tests.support.scans import changed
+
+Sample = tuple[str, dict[str, float]]
+
+PAPER: dict[
+    str, Sample
+] = {  # Oren and Nayar 1995, table 1; sigma in degrees, ks of ours is 4 times
+    "A": ("oren_nayar", {"albedo": 0.90, "sigma_deg": 35.0}),
+    "C": ("oren_nayar", {"albedo": 0.70, "sigma_deg": 40.0}),
+    "D": ("oren_nayar+torrance_sparrow", {"albedo": 0.80, "sigma_deg": 20.0, "ks": 0.076}),
+    "E": ("oren_nayar+torrance_sparrow", {"albedo": 0.73, "sigma_deg": 24.0, "ks": 0.135}),
+    "F": ("oren_nayar+torrance_sparrow", {"albedo": 0.88, "sigma_deg": 17.0, "ks": 0.117}),
+}
+
+
+def random_sample(seed: int) -> Sample:
+    """A sample with a roughness of its own, of random model and parameters."""
+    rng = np.random.default_rng([seed, 21])
+    own = {"albedo": rng.uniform(0.1, 0.95), "sigma_deg": rng.uniform(8, 40)}
+    kinds: list[tuple[str, dict[str, float]]] = [
+        ("oren_nayar", {}),
+        ("oren_nayar+torrance_sparrow", {"ks": rng.uniform(0.02, 0.15)}),
+        ("oren_nayar+ggx", {"f0": rng.uniform(0.02, 0.08), "alpha": rng.uniform(0.1, 0.5)}),
+        ("wolff_oren_nayar", {"n": rng.uniform(1.3, 1.7)}),
+    ]
+    name, more = kinds[int(rng.integers(len(kinds)))]
+    return name, {**own, **more}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scanned:
+    """Result of a scan: time of its points in s, u of sigma and deviation in units of it."""
+
+    points: int
+    seconds: float
+    model: str
+    verdict: str
+    u: float | None
+    deviation: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Compared:
+    """The sweep and the adaptive scan of one sample; `end`: why the latter ended."""
+
+    sample: Sample
+    sweep: Scanned
+    adaptive: Scanned
+    end: str
+
+    @property
+    def ratio(self) -> float:
+        """Bench time of the adaptive scan over that of the sweep."""
+        return self.adaptive.seconds / self.sweep.seconds
+
+
+def five_degrees() -> Loaded:
+    """The demonstration: three incidences, 33 views from -80 to 80 degrees."""
+    return changed(base("bench_12bit"))
+
+
+def quick_fit(rows: Rows, loaded: Loaded) -> Choice:
+    """Fit as the run does, without the rig's acceptance: predicted readings have none."""
+    m = measurements(reduced_rows(rows, loaded), loaded)
+    return choose(m, None, loaded.protocol.fit.models, method="functional")
+
+
+def compared(sample: Sample, seed: int, folder: Path, loaded: Loaded | None = None) -> Compared:
+    """Measure a sample in both ways, with the same errors of the bench.
+
+    The goal is the u of sigma that the sweep's fit states; without one, that of the albedo.
+    """
+    plain = loaded or five_degrees()
+    sweep, name, wanted = _swept(plain, sample, seed)
+    listed = candidate_list(with_goal(plain, f"{name}={wanted!r}", None))
+    bench = PredictedBench(listed, seed, sample)
+    with bench.create(folder) as record:
+        known = bench.run(record).known
+        end = batches_of(record.events())[-1].end
+        choice = quick_fit(record.rows(), listed)
+    adaptive = _scanned(choice, known, bench.chooser.layout, sample, name)
+    return Compared(sample=sample, sweep=sweep, adaptive=adaptive, end=end)
+
+
+def _swept(plain: Loaded, sample: Sample, seed: int) -> tuple[Scanned, str, float]:
+    plan = make_plan(plain)
+    chooser = Chooser(Layout(plan, plain), Aims(u={}, budget_s=None, models=None, method="auto"))
+    bench = PredictedBench(plain, seed, sample, chooser)
+    choice = quick_fit(Rows(bench.all_readings(), (), ()), plain)
+    best = choice.best
+    if best is None:
+        raise ValueError("the sweep has no fit")
+    name = "sigma_deg" if best.u.get("sigma_deg") is not None else "albedo"
+    u = best.u.get(name)
+    if u is None:
+        raise ValueError(f"the sweep states no u of {name}")
+    return _scanned(choice, plan.steps, chooser.layout, sample, name), name, u
+
+
+def _scanned(
+    choice: Choice, steps: Sequence[Step], layout: Layout, sample: Sample, name: str
+) -> Scanned:
+    best, truth = choice.best, sample[1]
+    u = None if best is None else best.u.get(name)
+    off = None
+    if best is not None and u is not None and physics(best.model) == physics(sample[0]):
+        off = (best.values[name] - truth[name]) / u
+    return Scanned(
+        points=sum(step.kind == "point" for step in steps),
+        seconds=points_s(steps, layout),
+        model="" if best is None else best.model,
+        verdict=choice.verdict,
+        u=u,
+        deviation=off,
+    )
+
+
+def points_s(steps: Sequence[Step], layout: Layout) -> float:
+    """Time of the points alone: their moves, their settling and their frames."""
+    before = [None, *steps[:-1]]
+    return sum(
+        layout.frames_s(step) + (0.0 if last is None else layout.moves_s(last.pose, step.pose))
+        for last, step in zip(before, steps, strict=True)
+        if step.kind == "point"
+    )
