@@ -78,8 +78,15 @@ def _with_8_bits(loaded: Loaded) -> Loaded:
 
 
 def _without_tile(loaded: Loaded) -> Loaded:
-    references = loaded.protocol.references.model_copy(update={"white_tile": None})
-    return changed(loaded, references=references)
+    """With a warm lamp: a scan that need not read a tile begins while another would warm up."""
+    simulation, references = loaded.rig.simulation, loaded.protocol.references
+    lamp = simulation.lamp_defects.model_copy(update={"warm_up": 0.0})
+    warm = simulation.model_copy(update={"lamp_defects": lamp})
+    return changed(
+        loaded,
+        rig={"simulation": warm},
+        references=references.model_copy(update={"white_tile": None}),
+    )
 
 
 _OTHER_SCANS = {
