@@ -22,7 +22,7 @@ def npz_bytes(found: SampleMap) -> bytes:
     file = io.BytesIO()
     content: dict[str, Any] = {**_maps(found), "x_mm": found.x_mm, "y_mm": found.y_mm}
     content |= {"model": found.model, "sample": found.sample, "title": found.title}
-    np.savez_compressed(file, **content)
+    np.savez(file, **content)
     return file.getvalue()
 
 

@@ -45,35 +45,38 @@ class Places:
 class TableField:
     """Tables of a model's parts over a rectangle of the sample, by the place in mm.
 
-    x_mm, y_mm: (3,), the places of the tables; by_place: one for each y and x, in this order.
+    x_mm, y_mm: (3,), the places of the tables. sigma_deg: (S,). once, twice, lobe: (9, S, K) in
+    1/sr, one table for each y and x, in this order; lobe None without one.
     """
 
     x_mm: FloatArray
     y_mm: FloatArray
-    by_place: tuple[tuple[SigmaTable, ...], ...]
+    sigma_deg: FloatArray
+    once: FloatArray
+    twice: FloatArray
+    lobe: FloatArray | None
 
     @classmethod
     def of(cls, model: str, places: Places, half_mm: tuple[float, float]) -> TableField:
         """Return the tables over a rectangle about the axis with these half sides in mm."""
         x, y = (half * np.linspace(-1, 1, _NODES) for half in half_mm)
-        rows = (tuple(SigmaTable.of(model, places.geometry(a, b)) for a in x) for b in y)
-        return cls(x, y, tuple(rows))
+        tables = [SigmaTable.of(model, places.geometry(a, b)) for b in y for a in x]
+        lobes = [t.lobe for t in tables if t.lobe is not None]
+        return cls(
+            x,
+            y,
+            tables[0].sigma_deg,
+            np.stack([t.once for t in tables]),
+            np.stack([t.twice for t in tables]),
+            np.stack(lobes) if lobes else None,
+        )
 
     def at(self, x_mm: float, y_mm: float) -> SigmaTable:
         """Return the table at a place."""
-        weights = np.outer(_lagrange(y_mm, self.y_mm), _lagrange(x_mm, self.x_mm))
-        tables = [table for row in self.by_place for table in row]
-        pairs = list(zip(weights.ravel().tolist(), tables, strict=True))
-        first = tables[0]
-        lobe = None
-        if first.lobe is not None:
-            lobe = sum((w * t.lobe for w, t in pairs if t.lobe is not None), np.zeros(1))
-        return SigmaTable(
-            first.sigma_deg,
-            sum((w * t.once for w, t in pairs), np.zeros(1)),
-            sum((w * t.twice for w, t in pairs), np.zeros(1)),
-            lobe,
-        )
+        weights = np.outer(_lagrange(y_mm, self.y_mm), _lagrange(x_mm, self.x_mm)).ravel()
+        once, twice = (np.tensordot(weights, a, 1) for a in (self.once, self.twice))
+        lobe = None if self.lobe is None else np.tensordot(weights, self.lobe, 1)
+        return SigmaTable(self.sigma_deg, once, twice, lobe)
 
 
 def _lagrange(at: float, nodes: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ from instrument.pinhole import Pinhole
 _ROUNDS, _STEP_MM = 5, 0.005  # a smaller change ends the search
 _NEAR_DEG = 35.0  # views up to here show the texture at its place
 _MOST_CELLS = 160  # along a side, of the middle of the map
-_LARGEST_U, _MOST_U = 0.25, 8.0  # of the placement: u of a height, and a height
+_LARGEST_U, _MOST_U = 0.05, 8.0  # of the placement: u of a height, and a height
 _LEAST_CELLS, _SINGULAR = 100, 1e10
 
 
