@@ -3,7 +3,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# Ten workers need not each read the files that have no such test.
+# Eight workers need not each read the files that have no such test.
 WAITING = $(shell grep -rl --include='test_*.py' 'pytest\.mark\.waits' tests)
 
 # A hundred processes start in a test run: without its bytecode each compiles the project anew.
@@ -20,7 +20,7 @@ test: $(VENV)/.installed-dev
 	$(BIN)/pytest -n auto --dist worksteal -m "not hil and not waits"
 
 waiting: $(VENV)/.installed-dev
-	$(BIN)/pytest -n 10 -m "waits and not hil" $(WAITING)
+	$(BIN)/pytest -n 8 -m "waits and not hil" $(WAITING)
 
 # The tests for a bench, in an emulated computer with real kernel drivers; OPTIONS="--slow" runs all.
 hil-emulated: $(VENV)/.installed-dev

@@ -62,4 +62,4 @@ def test_the_stage_contract_runs_by_the_settings_of_a_rig_file(rig: Path) -> Non
         command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
     )
     assert done.returncode == 0, done.stdout
-    assert "27 passed" in done.stdout  # nine tests of each axis
+    assert "33 passed" in done.stdout  # eleven tests of each axis
