@@ -16,7 +16,7 @@ from functools import partial
 from acquisition.engine.axis import Axis
 from acquisition.engine.exposure.exposer import Exposed, Exposer
 from acquisition.engine.fly.flights import Flights
-from acquisition.engine.frame_files import write_frames
+from acquisition.engine.frame_files import write_kept
 from acquisition.engine.frame_reduction import FrameReduction
 from acquisition.engine.onlookers import MEASURING, KnownLamp, Phase, Present
 from acquisition.engine.pause import Paused, PauseSwitch
@@ -389,8 +389,8 @@ class Engine:
             preview = make_preview(exposed, window, self._rig.camera.max_dn)
 
         def write() -> None:
-            keeps = self._protocol.keep_frames
-            files = write_frames(exposed.frames, step.index, record.folder) if keeps else []
+            taken = exposed.frames, exposed.dark
+            files = write_kept(reading, *taken, self._protocol, self._rig, record.folder)
             record.add_reading(reading, preview, exposed.frames, files)
 
         record.writing.begin(write)

@@ -241,6 +241,15 @@ class FlyConfig(Section):
     u_blur: Annotated[float, Field(ge=1e-6, le=0.1)] = 0.002
 
 
+class MapsConfig(Section):
+    """Light of each cell of the sample, kept of each point for `gonio map`.
+
+    `cell_mm`: side of a cell; at least a pixel seen along the normal.
+    """
+
+    cell_mm: Annotated[float, Field(gt=0, le=250)] = 0.5
+
+
 class FitConfig(Section):
     """Models to fit; by default all models of the ladder.
 
@@ -361,6 +370,7 @@ class Protocol(Section):
     dark_frames: Annotated[int, Field(ge=1, le=10_000)] = 8
     exposure_target: Annotated[float, Field(gt=0, lt=1)] = 0.7
     keep_frames: bool = False
+    maps: MapsConfig | None = None
     motion: Literal["stepped", "fly"] = "stepped"
     fly: FlyConfig = FlyConfig()
     references: References = References()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-FOLDER = "frames"
+FOLDER, CELLS_FOLDER = "frames", "cells"
 _FRAME = re.compile(rf"{FOLDER}/(\d{{6,}})-\d{{4,}}\.tiff", re.ASCII)
 
 
@@ -16,6 +16,11 @@ def frame_name(step: int, number: int) -> str:
 def dark_name(exposure_s: float) -> str:
     """Return the file of the mean dark of an exposure: linear counts as 32-bit floats."""
     return f"{FOLDER}/dark-{exposure_s:.9g}s.tiff"
+
+
+def cells_name(step: int) -> str:
+    """Return the file of the light of the cells at a step, for protocols with `maps`."""
+    return f"{CELLS_FOLDER}/{step:06d}.npy"
 
 
 def step_of(name: str) -> int | None:

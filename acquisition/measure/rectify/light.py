@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.measure.radiometry import SATURATION_FRACTION
+from acquisition.measure.window import window_at
 from instrument.config.camera import CameraConfig
+from instrument.config.protocol import PatchConfig
 from instrument.geometry import BoolArray
 from instrument.pinhole import Pinhole
 
@@ -48,6 +50,19 @@ def light_dn(
     if np.any(bright):
         total[bright if hot is None else bright & ~hot] = np.nan
     return total
+
+
+def window_dn(light: FloatImage, theta_r_deg: float, pinhole: Pinhole, patch: PatchConfig) -> float:
+    """Return the mean light of the measured patch over its area, in DN, pixels with NaN apart.
+
+    light: (rows, columns) in DN, as `light_dn` returns it; theta_r is signed.
+    """
+    window = window_at(theta_r_deg, pinhole, patch.width_mm, patch.height_mm)
+    rows, columns = np.ogrid[window.crop]
+    area = window.weights * pinhole.cos4(columns, rows)
+    own = light[window.crop]
+    known = np.isfinite(own)
+    return float(np.sum(area[known] * own[known]) / max(float(area[known].sum()), 1e-30))
 
 
 @lru_cache(maxsize=2)

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.measure.hot_pixels import find_hot_pixels
 from acquisition.measure.rectify.cell_grid import CellGrid
-from acquisition.measure.rectify.kept_files import dark_name, step_of
-from acquisition.measure.rectify.light import FloatImage, light_dn
+from acquisition.measure.rectify.kept_files import cells_name, dark_name, step_of
+from acquisition.measure.rectify.light import FloatImage, light_dn, window_dn
 from acquisition.measure.rectify.rectified import rectify
-from acquisition.measure.window import window_at
 from instrument.config.load import Loaded
 from instrument.errors import InputError
 from instrument.geometry import BoolArray, FloatArray
@@ -37,6 +38,83 @@ class CellLight:
 
     cells: NDArray[np.float32]
     window: FloatArray
+
+
+class CellSource(Protocol):
+    """Light of the cells of a run, from what it has kept.
+
+    without_dark: exposures in seconds of which the record has a mean alone.
+    """
+
+    without_dark: set[float]
+
+    def steps(self) -> set[int]:
+        """Return the steps whose cells can be had."""
+
+    def require(self, readings: Sequence[Reading]) -> None:
+        """Raise `InputError` that names what is missing of these readings."""
+
+    def light(self, readings: Sequence[Reading], grid: CellGrid) -> CellLight:
+        """Return the light of the cells (K, rows, columns) in these readings, in DN."""
+
+
+class KeptCells:
+    """Cells that a scan with `maps` has gathered, by step.
+
+    Raises `InputError` for cells of another size than the protocol's.
+    """
+
+    def __init__(self, record: Record, loaded: Loaded, grid: CellGrid) -> None:
+        maps = loaded.protocol.maps
+        self._run, self._grid = record.folder, grid
+        self.without_dark: set[float] = set()
+        if maps is None or grid != CellGrid.of(loaded.protocol.sample, loaded.rig, maps.cell_mm):
+            kept = "none" if maps is None else f"of {maps.cell_mm:g} mm"
+            raise InputError(
+                f"{record.folder}: cells of {grid.cell_mm:g} mm asked for, but the scan gathered "
+                f"{kept}; allowed: those, or a run with keep_frames: true"
+            )
+        self._steps = {r.step for r in record.readings() if self._path(r.step).is_file()}
+
+    def steps(self) -> set[int]:
+        """Return the steps whose cells are in the run's folder."""
+        return self._steps
+
+    def require(self, readings: Sequence[Reading]) -> None:
+        """Do nothing: only readings with cells are asked for."""
+
+    def light(self, readings: Sequence[Reading], grid: CellGrid) -> CellLight:
+        """Return the light of the cells (K, rows, columns), in DN, of a band of the rows."""
+        first = round(float(self._grid.y_mm[0] - grid.y_mm[0]) / grid.cell_mm)
+        found = [self._read(r.step) for r in readings]
+        rows = slice(first, first + grid.rows)
+        cells = np.stack([values[1:].reshape(self._grid.rows, -1)[rows] for values in found])
+        return CellLight(cells, np.array([values[0] for values in found], dtype=np.float64))
+
+    def _path(self, step: int) -> Path:
+        return self._run / cells_name(step)
+
+    def _read(self, step: int) -> NDArray[np.float32]:
+        """Return window and cells in one row; raises `InputError` for a file of anything else."""
+        size, path = 1 + self._grid.rows * self._grid.columns, self._path(step)
+        try:
+            data = read_file(path, 4 * size + 4096)
+            values = np.load(io.BytesIO(data), allow_pickle=False)
+        except (OSError, ValueError, EOFError) as error:
+            raise InputError(f"{path}: cannot be read: {error}") from None
+        if values.shape != (size,) or values.dtype != np.float32:
+            raise InputError(
+                f"{path}: {values.shape}, {values.dtype}; allowed: {size} 32-bit floats, as the "
+                "scan wrote them"
+            )
+        return np.asarray(values)
+
+
+def cell_source(record: Record, loaded: Loaded, grid: CellGrid) -> CellSource:
+    """Return the run's kept frames, or else its cells; raises `InputError` without either."""
+    if loaded.protocol.maps is not None and not loaded.protocol.keep_frames:
+        return KeptCells(record, loaded, grid)
+    return KeptFrames(record, loaded)
 
 
 class KeptFrames:
@@ -78,7 +156,7 @@ class KeptFrames:
 
         def read(k: int) -> None:
             light = self._light(readings[k])
-            window[k] = self._window_dn(light, readings[k].theta_r_deg)
+            window[k] = window_dn(light, readings[k].theta_r_deg, self._pinhole, self._patch)
             cells[k] = rectify(light, grid, self._pinhole, readings[k].theta_r_deg)
 
         with ThreadPoolExecutor(_WORKERS) as pool:
@@ -90,15 +168,6 @@ class KeptFrames:
         images = [self._image(name) for name in self._names[reading.step]]
         dark, hot = self._darks[reading.exposure_s]
         return light_dn(images, dark, hot, self._camera, self._pinhole)
-
-    def _window_dn(self, light: FloatImage, theta_r_deg: float) -> float:
-        """Return the mean of the measuring window over the patch's area, without NaN."""
-        window = window_at(theta_r_deg, self._pinhole, self._patch.width_mm, self._patch.height_mm)
-        rows, columns = np.ogrid[window.crop]
-        area = window.weights * self._pinhole.cos4(columns, rows)
-        own = light[window.crop]
-        known = np.isfinite(own)
-        return float(np.sum(area[known] * own[known]) / max(float(area[known].sum()), 1e-30))
 
     def _dark(self, exposure_s: float) -> tuple[FloatImage | float, BoolArray | None]:
         name = dark_name(exposure_s)
@@ -138,6 +207,6 @@ def _by_step(record: Record) -> Mapping[int, list[str]]:
     if not found:
         raise InputError(
             f"{record.folder}: the frames of this run were not kept, and a map needs them; "
-            "allowed: a run whose protocol has keep_frames: true"
+            "allowed: a run whose protocol has keep_frames: true, or maps"
         )
     return found

@@ -9,7 +9,7 @@ import numpy as np
 
 from acquisition.measure.rectify.cell_grid import CellGrid
 from acquisition.results.maps.cell_brdf import cell_data, in_own_light, places_of, usable
-from acquisition.results.maps.kept_cells import KeptFrames
+from acquisition.results.maps.kept_cells import CellSource, cell_source
 from acquisition.results.maps.mean_curve import MeanCurve
 from acquisition.results.maps.surface_height import (
     Height,
@@ -22,7 +22,6 @@ from analysis.sample_maps.block_fit import CellData, fit_blocks
 from analysis.sample_maps.places import TableField
 from analysis.sample_maps.sample_map import SampleMap
 from instrument.config.load import Loaded
-from instrument.config.rig import Rig
 from instrument.errors import InputError, NotDetermined
 from instrument.geometry import BoolArray, FloatArray
 from instrument.pinhole import Pinhole
@@ -43,9 +42,14 @@ def map_sample(
     Raises `InputError` where frames were not kept or are missing, or the cells have no size that
     the camera resolves, and `NotDetermined` where the curve does not determine the model.
     """
-    cell_mm = usual_cell_mm(loaded.rig) if cell_mm is None else cell_mm
+    if loaded.protocol.markers is not None:
+        raise InputError(
+            f"{record.folder}: its window follows markers, which a map does not; allowed: a run "
+            "without markers"
+        )
+    cell_mm = usual_cell_mm(loaded) if cell_mm is None else cell_mm
     grid = CellGrid.of(loaded.protocol.sample, loaded.rig, cell_mm)
-    frames = KeptFrames(record, loaded)
+    frames = cell_source(record, loaded, grid)
     reduced = reduced_run(record, loaded)
     require_usable(reduced)
     kept = reduced.valid & _has_frames(reduced, frames) & usable(reduced.points, grid, loaded.rig)
@@ -60,12 +64,15 @@ def map_sample(
     return _Mapping(frames, readings, curve, grid, loaded).made(reduced)
 
 
-def usual_cell_mm(rig: Rig) -> float:
-    """Return the side of a cell where none is named."""
-    return max(_USUAL_MM, rig.camera.field_width_mm / rig.camera.width_px)
+def usual_cell_mm(loaded: Loaded) -> float:
+    """Return the side of a cell where none is named: the protocol's, or a usual one."""
+    if loaded.protocol.maps is not None:
+        return loaded.protocol.maps.cell_mm
+    camera = loaded.rig.camera
+    return max(_USUAL_MM, camera.field_width_mm / camera.width_px)
 
 
-def _has_frames(reduced: Reduced, frames: KeptFrames) -> BoolArray:
+def _has_frames(reduced: Reduced, frames: CellSource) -> BoolArray:
     steps = frames.steps()
     return np.array([p.step in steps for p in reduced.points], dtype=bool)
 
@@ -83,7 +90,7 @@ class _Mapping:
 
     def __init__(
         self,
-        frames: KeptFrames,
+        frames: CellSource,
         readings: Sequence[Reading],
         curve: MeanCurve,
         grid: CellGrid,

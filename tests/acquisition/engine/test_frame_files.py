@@ -8,9 +8,15 @@ from pathlib import Path
 import cv2
 import pytest
 
-from acquisition.engine.frame_files import frame_bytes, require_disk_space, require_own_folder
+from acquisition.engine.frame_files import (
+    cell_bytes,
+    frame_bytes,
+    require_disk_space,
+    require_own_folder,
+)
 from acquisition.measure.rectify.kept_files import dark_name, step_of
 from acquisition.plan.plan import make_plan
+from instrument.config.protocol import MapsConfig
 from instrument.errors import InputError, StorageError
 from instrument.record.record import Record
 from tests.support.scans import changed, small_scan
@@ -31,6 +37,26 @@ def test_frames_that_would_not_fit_are_refused_before_anything_moves(
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=needed - 1))
     with pytest.raises(InputError, match=r"keep_frames: the frames need .* GB, and .* GB free"):
         require_disk_space(plan, LOADED, tmp_path / "not yet" / "run")
+
+
+def test_cells_that_no_camera_resolves_or_disk_holds_are_refused_beforehand(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded = changed(small_scan(), maps=MapsConfig(cell_mm=1.0))
+    plan = make_plan(loaded)
+    needed = cell_bytes(plan, loaded)
+    assert needed == 4 * 50 * 50 * 10
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=needed - 1))
+    with pytest.raises(InputError, match=r"maps: the cells need .* GB, and .* GB free"):
+        require_disk_space(plan, loaded, tmp_path / "run")
+    fine = changed(loaded, maps=MapsConfig(cell_mm=0.1))
+    with pytest.raises(InputError, match=r"demo.yaml: maps: cell_mm: 0.1 mm; allowed: 0.5625"):
+        require_disk_space(plan, fine, tmp_path / "run")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "cells").symlink_to(tmp_path)
+    with pytest.raises(InputError, match="cells: is a link or no folder"):
+        require_own_folder(loaded, tmp_path / "run")
 
 
 def test_kept_frames_are_whole_and_named_in_the_record(tmp_path: Path) -> None:

@@ -43,7 +43,7 @@ class Varied:
         references = small.protocol.references
         if not self.tile:
             references = References(drift_check=references.drift_check)
-        views = Steps(start=-72.0, stop=72.0, num=13)
+        views = Steps(start=-72.0, stop=72.0, num=11)
         return changed(
             small,
             rig={"simulation": simulation},

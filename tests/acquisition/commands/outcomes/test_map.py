@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from pathlib import Path
 
@@ -62,9 +63,10 @@ def test_a_model_may_be_named_and_the_result_is_json(run: Path) -> None:
 def test_what_cannot_be_mapped_is_refused_before_a_file_is_written(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bare = finished_run(small_demo(tmp_path, "oren_nayar"), tmp_path / "run")
+    bare = Path(shutil.copytree(run, tmp_path / "bare"))
+    shutil.rmtree(bare / "frames")
     for arguments, words in (
-        ((bare,), "frames of this run were not kept"),
+        ((bare,), "frames that the record names are missing: frames/0000"),
         ((run, "--cell-mm", "0.2"), "cell_mm: 0.2 mm; allowed: 0.5625"),
         ((run, "--model", "ggx"), "--model: ggx; allowed for a map: oren_nayar, "),
         ((tmp_path / "nowhere",), "nowhere"),

@@ -10,6 +10,7 @@ import pytest
 
 from acquisition.results.maps.sample_map import map_sample
 from analysis.sample_maps.sample_map import SampleMap
+from instrument.config.protocol import MapsConfig
 from instrument.errors import InputError
 from instrument.record.record import Record
 from tests.support.sample_maps.varied import Varied, truth
@@ -114,14 +115,31 @@ def test_a_run_without_frames_or_with_wrong_ones_is_refused(tmp_path: Path) -> N
             map_sample(record, loaded, "oren_nayar", 3.0)
 
 
-def test_bands_of_rows_give_the_same_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    varied = Varied("halves", ONE, True, 7)
-    loaded = varied.loaded()
+def test_bands_and_cells_gathered_while_scanning_give_the_same_map(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded = Varied("halves", ONE, True, 7).loaded()
+    gathering = changed(loaded, keep_frames=False, maps=MapsConfig(cell_mm=2.5))
+    with Record.create(tmp_path / "gathered", {}) as record:
+        scan(gathering, record)
+        assert not (record.folder / "frames").exists()
+        gathered = map_sample(record, gathering, "oren_nayar")
+        with pytest.raises(InputError, match=r"cells of 3 mm asked for, but .* of 2.5 mm"):
+            map_sample(record, gathering, "oren_nayar", 3.0)
+        kept = sorted((record.folder / "cells").iterdir())
+        kept[1].write_bytes(kept[1].read_bytes()[:-4])
+        with pytest.raises(InputError, match=rf"{kept[1].name}: cannot be read"):
+            map_sample(record, gathering, "oren_nayar")
+        np.save(kept[1], np.zeros(5))
+        with pytest.raises(InputError, match=r"\(5,\), float64; allowed: 401 32-bit floats"):
+            map_sample(record, gathering, "oren_nayar")
     with Record.create(tmp_path / "run", {}) as record:
         scan(loaded, record)
         whole = map_sample(record, loaded, "oren_nayar", 2.5)
-        monkeypatch.setattr("acquisition.results.maps.sample_map._MOST_BYTES", 4 * 13 * 20 * 6)
+        monkeypatch.setattr("acquisition.results.maps.sample_map._MOST_BYTES", 4 * 11 * 20 * 6)
         parts = map_sample(record, loaded, "oren_nayar", 2.5)
+    for name, values in whole.values.items():
+        assert gathered.values[name] == pytest.approx(values, rel=1e-5, nan_ok=True)
     assert parts.height_mm == pytest.approx(whole.height_mm)
     # Where a surface off the axis is moved, a band lacks its neighbours' rows: by microns of y.
     same = np.isfinite(parts.values["sigma_deg"]) & np.isfinite(whole.values["sigma_deg"])
