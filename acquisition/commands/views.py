@@ -84,7 +84,8 @@ def _plan_rows(loaded: Loaded, plan: Plan) -> Iterator[tuple[str, str]]:
     )
     flights = len({step.flight for step in plan.points} - {None})
     if flights:
-        yield "motion", f"{flights} steady turns of theta_r, a frame at each angle on the way"
+        turns = f"{flights} steady turn{'s' * (flights > 1)}"
+        yield "motion", f"{turns} of theta_r, a frame at each angle on the way"
     if loaded.protocol.keep_frames:
         yield "frames", f"all kept, {frame_bytes(plan, loaded) / 1e6:.0f} MB"
     yield "duration", f"about {duration_text(plan.duration_s)}"

@@ -21,6 +21,7 @@ from acquisition.results.effects.surface import (
     TILT_ACROSS,
     ZEROS,
 )
+from acquisition.results.effects.turning import turning_note
 from acquisition.results.facts.chosen_geometries import choice_note
 from acquisition.results.fitting import Fitted, u_without
 from acquisition.results.reduction import (
@@ -174,6 +175,7 @@ def notes(reduced: Reduced, fitted: Fitted, record: Record, loaded: Loaded) -> t
         _hidden_note(record),
         _flag_note(reduced),
         _drift_note(reduced),
+        turning_note(reduced.points),
         _scatter_note(reduced, loaded),
         _pull_note(fitted),
         _effects_note(fitted, loaded),

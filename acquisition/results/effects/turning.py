@@ -44,6 +44,19 @@ def turning_errors(
     return {BLUR: smear(points, value)}, shared
 
 
+def turning_note(points: Sequence[Reading]) -> str:
+    """Return how the points were measured in motion, in one sentence; empty if none was."""
+    blur_deg = max((point.blur_deg for point in points), default=0.0)
+    if not blur_deg:
+        return ""
+    u_deg = max(abs(point.u_latency_deg) for point in points)
+    return (
+        f"theta_r turned while its frames were taken, by up to {blur_deg:.2g} deg in one exposure; "
+        f"angles are the mean ones, with a u of {u_deg:.2g} deg by the latency between camera and "
+        "axis"
+    )
+
+
 def smear(points: Sequence[Reading], value: FloatArray) -> FloatArray:
     """Relative change of values (N,), in any unit, by the curvature in each frame, without sign."""
     relative = np.zeros(len(points))

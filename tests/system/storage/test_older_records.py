@@ -33,7 +33,8 @@ def results(run: Path) -> tuple[list[list[str]], object]:
 
 
 @pytest.mark.parametrize(
-    ("command", "version"), [(("report",), 3), (("resume", "--yes"), 3), (("resume", "--yes"), 5)]
+    ("command", "version"),
+    [(("report",), 3), (("resume", "--yes"), 3), (("resume", "--yes"), 5), (("report",), 6)],
 )
 def test_a_run_of_an_older_version_gives_the_same_results(
     run: Path, tmp_path: Path, command: tuple[str, ...], version: int

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from acquisition.engine.engine import Devices, Engine
 from acquisition.engine.pause import PauseSwitch
 from acquisition.engine.resume import Progress
 from acquisition.plan.plan import Step, make_plan
-from acquisition.results.effects.turning import smear
+from acquisition.results.effects.turning import smear, turning_note
 from acquisition.results.reduction import reduced_run
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded
@@ -228,4 +229,5 @@ def test_values_carry_the_blur_and_the_errors_of_the_angles(flown: Loaded, recor
     own = np.array([p.u_latency_deg for p in reduced.points])
     assert np.array_equal(shared["latency of the frames"].theta_r_deg, own)
     assert np.unique(shared["angle of a moving frame"].group).size == len(reduced.points)
+    assert re.search(r"by up to 0\.\d+ deg in one exposure", turning_note(reduced.points))
     assert Progress.of(record).missing(make_plan(flown)) == ()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.results.effects.turning import smear, turning_errors
+from acquisition.results.effects.turning import smear, turning_errors, turning_note
 from instrument.geometry import FloatArray
 from instrument.record.reading import Reading
 
@@ -58,4 +58,6 @@ def test_each_setting_of_the_lamp_has_its_own_curve() -> None:
 
 
 def test_frames_at_rest_have_neither() -> None:
-    assert turning_errors(readings(np.arange(5.0), 0.0), np.ones(5)) == ({}, ())
+    still = readings(np.arange(5.0), 0.0)
+    assert turning_errors(still, np.ones(5)) == ({}, ())
+    assert turning_note(still) == ""
