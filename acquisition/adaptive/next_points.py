@@ -31,9 +31,10 @@ MOST = 8
 
 _TOLD = 100.0  # chi2, to first order, beyond which a point more need not tell two models apart
 _LEAST = 2  # points of a batch, even where fewer may reach the goal
-_STEP, _SEARCHES = 1.5, 12  # of the search for the best count
+_STEP, _SEARCHES = 1.6, 11  # of the search for the best count
 _SMALL = 0.02  # share of a point in units of the largest, below which it is left out
-_ROUNDS = 25  # of the weights, for each count
+_ROUNDS = 20  # of the weights, for each count
+_NOTHING = 1e-4  # share in units of the largest, below which a point does not come back
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,13 +211,16 @@ class NextPoints:
 
     def _better(self, share: FloatArray, count: float) -> FloatArray:
         """Improve the shares (N,), of a sum of 1 and as a ratio, of a design of so many points."""
-        asked = np.flatnonzero(self._weights)
-        root = np.sqrt(self._weights[asked])
+        aims = np.diag(np.sqrt(self._weights))[:, self._weights > 0]
+        used = np.flatnonzero(share > _NOTHING * share.max())
+        rows, own = self._once[used], share[used]
         for _ in range(_ROUNDS):
-            inverse = np.linalg.inv(self._known + self._added(count * share))[:, asked] * root
-            share = share * np.sqrt(np.square(self._once @ inverse).sum(axis=1))
-            share = share / share.sum()
-        return share
+            matrix = self._known + (rows * (count * own)[:, np.newaxis]).T @ rows
+            own = own * np.sqrt(np.square(rows @ np.linalg.solve(matrix, aims)).sum(axis=1))
+            own = own / own.sum()
+        found = np.zeros(share.size)
+        found[used] = own
+        return found
 
     def _added(self, weights: FloatArray) -> FloatArray:
         """Information (unknowns, unknowns) of further points, with weights (N,) as a ratio."""

@@ -203,11 +203,19 @@ def report_run(
 def show_plan(protocol_path: Path, rig_path: Path | None, as_json: bool) -> None:
     """Print the plan of a scan; opens no device."""
     loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
-    plan = make_plan(loaded)
+    plan, adaptive = make_plan(loaded), None
+    if loaded.protocol.goal is not None:
+        from acquisition.commands.planning.adaptive import AdaptivePlan
+
+        adaptive = AdaptivePlan.of(loaded)
     if as_json:
-        sys.stdout.write(json.dumps(_plan_json(loaded, plan), allow_nan=False) + "\n")
-    else:
-        print_plan(loaded, plan)
+        found = _plan_json(loaded, plan)
+        found |= {} if adaptive is None else {"adaptive": adaptive.as_json()}
+        sys.stdout.write(json.dumps(found, allow_nan=False) + "\n")
+        return
+    print_plan(loaded, plan)
+    if adaptive is not None:
+        adaptive.show()
 
 
 def _plan_json(loaded: Loaded, plan: Plan) -> dict[str, object]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from acquisition.results.facts.chosen_geometries import reasons
 from acquisition.results.facts.input_files import calibration_rows, file_rows
 from acquisition.results.facts.lamp_levels import lamp_levels
 from acquisition.results.fitting import Fitted
@@ -59,6 +60,7 @@ def report_data(
         candidates=candidates(fitted),
         budget=budget(parts),
         sources=sources_of(parts),
+        chosen_for=_chosen_for(reduced, record),
         lamp=lamp_levels(reduced.drifts, record.readings()),
         previews=tuple(record.previews()),
         rig=(*_rig_rows(loaded.rig), *_tile_rows(protocol.references.white_tile)),
@@ -69,6 +71,12 @@ def report_data(
         versions=_version_rows(record),
         times=_time_rows(record),
     )
+
+
+def _chosen_for(reduced: Reduced, record: Record) -> tuple[str, ...]:
+    """Return what each point was measured for; nothing for a scan that chose none."""
+    own = reasons(record)
+    return tuple(own.get(point.step, "not known") for point in reduced.points) if own else ()
 
 
 def candidates(fitted: Fitted) -> tuple[Candidate, ...]:

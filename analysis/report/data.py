@@ -102,6 +102,7 @@ class ReportData:
         identifiable`, or empty where nothing was fitted; sets the colour of the box.
     budget: rows of (component, median relative u in %, share of the variance in %).
     sources: relative standard uncertainties (N,) by source, those of one kind combined.
+    chosen_for: what a scan that chose its geometries measured each point for; else empty.
     lamp: levels at the drift checks. calibrations, files: what they found, and hashes.
     """
 
@@ -124,6 +125,7 @@ class ReportData:
     budget: tuple[tuple[str, float, float], ...] = ()
     sources: Mapping[str, FloatArray] = field(default_factory=dict)
     relative_brdf: bool = False
+    chosen_for: tuple[str, ...] = ()
     lamp: tuple[LampLevels, ...] = ()
     previews: tuple[Preview, ...] = ()
     rig: Rows = ()
@@ -136,7 +138,7 @@ class ReportData:
 
     def __post_init__(self) -> None:
         points, fitted = len(self.theta_i_deg), int(np.count_nonzero(self.fitted))
-        for name in _COLUMNS:
+        for name in (*_COLUMNS, *(("chosen_for",) if self.chosen_for else ())):
             if (size := len(getattr(self, name))) != points:
                 raise ValueError(f"{name}: {size} entries for {points} points")
         for c in self.candidates:

@@ -32,7 +32,8 @@ def point_texts(data: ReportData, sweeps: Sequence[PlottedSweep]) -> list[str]:
             angles = (("θᵢ", data.theta_i_deg), ("θᵣ", data.theta_r_deg), ("Δφ", data.dphi_deg))
             place = ", ".join(f"{symbol} {_degrees(column[i])}" for symbol, column in angles)
             measured = f"{name} {format_value(float(value[i]), float(u[i]), unit)}"
-            lines = [place, measured, _difference(sweep, n), visible(data.flags[i])]
+            why = f"measured for: {data.chosen_for[i]}" if data.chosen_for else ""
+            lines = [place, measured, _difference(sweep, n), visible(data.flags[i]), visible(why)]
             texts[i] = "\n".join(line for line in lines if line)
     return texts
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import re
 import signal
@@ -70,7 +71,10 @@ def test_report_and_table_say_what_each_geometry_was_measured_for(run: tuple[Pat
     assert len(rows) == points < 30
     assert {row["chosen_for"] for row in rows} <= {"lack of fit", "albedo", "other models"}
     said = r"the scan chose its geometries: 1\d for lack of fit.* It ended as the goal is reached"
-    assert re.search(said, (folder / "report.html").read_text())
+    report = (folder / "report.html").read_text()
+    assert re.search(said, report)
+    for why in {row["chosen_for"] for row in rows}:
+        assert f"measured for: {why}" in report
     assert re.search(said, re.sub(r"\s+", " ", text))
 
 
@@ -81,6 +85,20 @@ def test_the_run_is_complete_and_reported_again_as_it_was(run: tuple[Path, str])
     done = gonio("resume", folder)  # nobody is asked: nothing moves
     assert done.returncode == 0, done.stderr
     assert (folder / "measurements.csv").read_bytes() == table
+
+
+def test_the_plan_of_a_protocol_with_a_goal_tells_the_first_batch(small: Path) -> None:
+    path = small.with_name("goal.yaml")
+    path.write_text(f"{small.read_text()}goal: {{albedo: {{u: 0.02}}}}\nbudget_min: 30\n")
+    told = json.loads(gonio("plan", path, "--json").stdout)["adaptive"]
+    assert (told["until"], told["budget_s"], told["candidates"]) == ({"albedo": 0.02}, 1800, 30)
+    assert len(told["first_batch"]) == 8
+    assert 0 < told["u_of_all_candidates"]["albedo"] < 0.02
+    text = re.sub(r"\s+", " ", gonio("plan", path).stdout)
+    assert "chooses its geometries until albedo=0.02, at most 30 min" in text
+    assert "first batch, with references" in text
+    path.write_text(path.read_text().replace("budget_min: 30", "budget_min: 0.1"))
+    assert gonio("plan", path).returncode == 2
 
 
 @pytest.mark.parametrize(

@@ -88,14 +88,15 @@ def quick_fit(rows: Rows, loaded: Loaded) -> Choice:
     return choose(m, None, loaded.protocol.fit.models, method="functional")
 
 
-def compared(sample: Sample, seed: int, folder: Path, loaded: Loaded | None = None) -> Compared:
+def compared(sample: Sample, seed: int, folder: Path, times: float = 1.0) -> Compared:
     """Measure a sample in both ways, with the same errors of the bench.
 
-    The goal is the u of sigma that the sweep's fit states; without one, that of the albedo.
+    The goal is so many `times` the u of sigma that the sweep's fit states; without one, of the
+    albedo.
     """
-    plain = loaded or five_degrees()
+    plain = five_degrees()
     sweep, name, wanted = _swept(plain, sample, seed)
-    listed = candidate_list(with_goal(plain, f"{name}={wanted!r}", None))
+    listed = candidate_list(with_goal(plain, f"{name}={times * wanted!r}", None))
     bench = PredictedBench(listed, seed, sample)
     with bench.create(folder) as record:
         known = bench.run(record).known
