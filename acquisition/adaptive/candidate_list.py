@@ -26,6 +26,11 @@ def with_goal(loaded: Loaded, until: str | None, budget_min: float | None) -> Lo
         goal = {name: GoalConfig.model_construct(u=u) for name, u in wanted_u(until).items()}
     if budget_min is not None and goal is None:
         raise InputError("--budget-min: allowed with --until, or for a protocol with a goal")
+    if goal is not None and loaded.protocol.motion == "fly":
+        raise InputError(
+            f"--until: not for motion: fly in {loaded.protocol_path}; allowed: stepped, as it "
+            "chooses single points"
+        )
     if budget_min is not None and not 0 < budget_min < math.inf:
         raise InputError(f"--budget-min {budget_min:g}; allowed: minutes, more than 0")
     budget = loaded.protocol.budget_min if budget_min is None else budget_min

@@ -381,6 +381,8 @@ class Protocol(Section):
     budget_min: Positive | None = None
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """Refuse a budget without a goal."""
+        """Refuse a budget without a goal, and a goal of a scan that does not stop."""
+        if self.goal is not None and self.motion == "fly":
+            yield "motion", "fly beside a goal; allowed: stepped, as it chooses single points"
         if self.budget_min is not None and self.goal is None:
             yield "budget_min", f"{self.budget_min:g} without a goal; allowed: beside goal"

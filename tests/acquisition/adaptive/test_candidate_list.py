@@ -12,7 +12,7 @@ from acquisition.plan.plan import make_plan
 from acquisition.results.model_check import check_model
 from instrument.config.load import Loaded, load_protocol
 from instrument.errors import InputError
-from tests.support.scans import small_demo
+from tests.support.scans import changed, small_demo
 
 
 @pytest.fixture
@@ -50,6 +50,7 @@ def test_options_stand_in_place_of_the_goal_of_the_protocol(demo: Loaded) -> Non
         ("goal: {sigma_deg: {u: 80.0}}", r"goal.sigma_deg: u 80; allowed: more than 0, up to"),
         ("goal: {sigma_deg: {u: -0.2}}", r"goal.sigma_deg.u: -0.2 is too small; allowed: a number"),
         ("goal: {sigma_deg: 0.2}", r"goal.sigma_deg: 0.2 is a number; allowed: a block with u"),
+        ("goal: {ks: {u: 0.1}}\nmotion: fly", r"motion: fly beside a goal; allowed: stepped"),
         ("budget_min: 30.0", r"budget_min: 30 without a goal; allowed: beside goal"),
     ],
 )
@@ -78,6 +79,12 @@ def test_a_wrong_goal_in_an_option_is_named(
 ) -> None:
     with pytest.raises(InputError, match=words):
         Aims.of(with_goal(demo, until, budget_min))
+
+
+def test_a_scan_that_does_not_stop_cannot_choose_its_points(demo: Loaded) -> None:
+    flying = changed(demo, motion="fly")
+    with pytest.raises(InputError, match=r"--until: not for motion: fly in .*; allowed: stepped"):
+        with_goal(flying, "ks=0.1", None)
 
 
 def test_without_a_white_tile_no_scale_can_be_asked_for(demo: Loaded) -> None:
