@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from acquisition.adaptive.candidate_list import candidate_list, with_goal
+from acquisition.adaptive.course import chooser_of, chosen_while_measured
 from acquisition.live.following.board import Board
 from acquisition.live.following.run_follower import RunFollower
 from acquisition.live.following.run_reader import RunReader
@@ -47,6 +49,30 @@ def contents(board: Board, kind: str) -> list[Any]:
 
 def state(board: Board) -> str:
     return str(contents(board, "progress")[-1]["state"])
+
+
+def test_a_scan_that_chooses_its_steps_is_complete_at_its_end_alone(
+    loaded: Loaded, tmp_path: Path
+) -> None:
+    listed = candidate_list(with_goal(loaded, "albedo=0.05", None))
+    run, chooser = tmp_path / "run", chooser_of(listed, make_plan(listed))
+    with begun_run(listed, run) as record, followed(run) as (follower, board):
+        (progress,) = contents(board, "progress")
+        assert (progress["done"], progress["total"], progress["state"]) == (0, 0, "measuring")
+        plan = chosen_while_measured(chooser, record)
+        first = plan.more()
+        scan(listed, record, upto=first[-1].index, plan=plan)  # the first batch is measured
+        follower.poll()
+        progress = contents(board, "progress")[-1]
+        assert (progress["done"], progress["total"]) == (len(first), len(first))
+        assert progress["state"] == "measuring"
+        plan = chosen_while_measured(chooser, record)
+        scan(listed, record, plan=plan)
+        record.add_event(NOW, FINISHED, "")
+        follower.poll()
+        progress = contents(board, "progress")[-1]
+        assert progress["done"] == progress["total"] == len(plan.known) < len(plan.steps)
+        assert progress["state"] == "finished"
 
 
 def test_a_run_grows_point_by_point(loaded: Loaded, tmp_path: Path) -> None:
