@@ -17,7 +17,7 @@ from sim.scene.variation import share_at
 from tests.support.scans import changed, small_scan
 from tests.support.whole_scans.stopped_scan import scan
 
-CELL_MM = 1.5
+CELL_MM = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +56,7 @@ class Varied:
             ],
             references=references,
             keep_frames=True,
+            frames_per_point=2,
             simulated_sample=SimulatedSample(
                 model="oren_nayar", parameters=one, variation=variation
             ),
