@@ -23,7 +23,9 @@ class CellData:
     """BRDF of cells: brdf (K, rows, columns) in 1/sr, NaN where a cell has none.
 
     x_mm (columns,), y_mm (rows,): places. floor, per_brdf, relative: (K,) each; the variance of a
-    value is floor + per_brdf * brdf + (relative * brdf)^2, in 1/sr^2.
+    value is floor + per_brdf * brdf + (relative * brdf)^2, in 1/sr^2. texture (rows, columns):
+    relative change of the light for each mm beside a cell, which the u of its place in each
+    picture, place_mm (K,), turns into a u of its own.
     """
 
     brdf: NDArray[np.float32]
@@ -32,12 +34,17 @@ class CellData:
     floor: FloatArray
     per_brdf: FloatArray
     relative: FloatArray
+    texture: FloatArray | None = None
+    place_mm: FloatArray | None = None
 
     def block(self, rows: slice, columns: slice) -> tuple[FloatArray, FloatArray]:
         """Return BRDF (K, C) in 1/sr of the block's cells, and its variance (K, C)."""
         own = self.brdf[:, rows, columns]
         brdf = own.reshape(own.shape[0], -1).astype(np.float64)
-        return brdf, self.variance(brdf)
+        variance = self.variance(brdf)
+        if self.texture is not None and self.place_mm is not None:
+            variance += (np.outer(self.place_mm, self.texture[rows, columns]) * brdf) ** 2
+        return brdf, variance
 
     def variance(self, brdf: FloatArray) -> FloatArray:
         """Return the variance, in 1/sr^2, of values (K,) or (K, C) in 1/sr."""

@@ -28,6 +28,8 @@ from instrument.pinhole import Pinhole
 from instrument.record.reading import Reading
 
 _MOST_DEG = 88.0  # from the normal, of lamp and camera: beyond, a cell may see neither
+_NEAREST = 5  # pictures nearest to the normal, which show the texture
+_U_HEIGHT_MM, _U_PIXELS = 0.02, 0.05  # of a cell's place (assumed)
 _PARTS = 9  # of the patch, along a side
 _ROUNDING_DN2 = 1 / 12  # variance of a count's rounding
 
@@ -131,7 +133,34 @@ def in_own_light(
         np.divide(own, light.astype(np.float32), out=data.brdf[k])
     theta_r_deg = np.array([r.theta_r_deg for r in readings])
     less = smoothing(theta_r_deg, height.mm, grid.cell_mm)
-    return replace(data, floor=data.floor * less, per_brdf=data.per_brdf * less)
+    return replace(
+        data,
+        floor=data.floor * less,
+        per_brdf=data.per_brdf * less,
+        texture=_texture_per_mm(data.brdf, theta_r_deg, grid.cell_mm),
+        place_mm=_u_place_mm(theta_r_deg, rig),
+    )
+
+
+def _texture_per_mm(
+    brdf: NDArray[np.float32], theta_r_deg: FloatArray, cell_mm: float
+) -> FloatArray:
+    """Return the relative change of each cell's light (rows, columns) for a mm along x."""
+    near = brdf[np.argsort(np.abs(theta_r_deg))[:_NEAREST]]
+    known = np.isfinite(near)
+    mean = np.where(known, near, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    by_mm = np.gradient(mean, cell_mm, axis=1)
+    return np.asarray(np.abs(by_mm) / np.where(mean > 0, mean, np.inf))
+
+
+def _u_place_mm(theta_r_deg: FloatArray, rig: Rig) -> FloatArray:
+    """Return the u (K,) in mm of the place that a cell has in each picture.
+
+    By the surface's height, as well as a texture tells it, and by what the camera's pixels blur.
+    """
+    theta_r = np.radians(theta_r_deg)
+    pixel_mm = rig.camera.field_width_mm / rig.camera.width_px
+    return np.hypot(_U_HEIGHT_MM * np.tan(theta_r), _U_PIXELS * pixel_mm / np.cos(theta_r))
 
 
 def _light_at_height(places: Places, height_mm: float) -> float:
