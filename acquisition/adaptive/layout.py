@@ -6,9 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from acquisition.plan.moves import NoPathError, moves_between
-from acquisition.plan.plan import Plan, Step
+from acquisition.plan.plan import Plan, Step, frames_s
 from acquisition.plan.pose import Pose, home_pose
-from instrument.config.axes import HandAxis
 from instrument.config.load import Loaded
 from instrument.config.rig import Rig
 from instrument.record.reading import Kind
@@ -25,11 +24,6 @@ class Layout:
     def rig(self) -> Rig:
         """The rig."""
         return self.loaded.rig
-
-    @property
-    def by_hand(self) -> bool:
-        """True where the lamp is set by hand: then one setting is finished before the next."""
-        return any(isinstance(self.rig.axes[name], HandAxis) for name in ("theta_i", "dphi"))
 
     def blocks(self) -> list[int]:
         """Return the settings of the lamp by hand, in the order of the list."""
@@ -79,7 +73,7 @@ class Layout:
 
     def frames_s(self, step: Step) -> float:
         """Return the expected time of a step's frames."""
-        return step.frames * (step.expected_exposure_s + self.rig.camera.frame_overhead_s)
+        return frames_s(step.frames, step.expected_exposure_s, self.rig)
 
     def moves_s(self, start: Pose, end: Pose) -> float:
         """Return the time of a move; infinite where no way leads there."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from acquisition.plan.plan import Plan, Step
+from acquisition.plan.plan import Plan, Step, frames_s
 from analysis.design.optimal import Costs
 from instrument.config.axes import HandAxis
 from instrument.config.load import Loaded
@@ -36,7 +36,7 @@ def bench_time(loaded: Loaded, plan: Plan, used: BoolArray) -> Costs:
 
 
 def _frames_s(loaded: Loaded, step: Step) -> float:
-    return step.frames * (step.expected_exposure_s + loaded.rig.camera.frame_overhead_s)
+    return frames_s(step.frames, step.expected_exposure_s, loaded.rig)
 
 
 def _moves_s(step: Step, *axes: str) -> float:

@@ -334,7 +334,7 @@ def _schedule(steps: Sequence[Step], hidden: tuple[Pose, ...], loaded: Loaded) -
         if step.surface != surface:  # the operator swaps sample and tile, or places the first
             swaps, surface, duration_s = swaps + 1, step.surface, duration_s + rig.swap_s
         if step.flight is None:
-            duration_s += _frames_s(step.frames, step.expected_exposure_s, rig)
+            duration_s += frames_s(step.frames, step.expected_exposure_s, rig)
         if step.expected_exposure_s not in taken_s:
             taken_s.add(step.expected_exposure_s)
             duration_s += _darks_s((step.expected_exposure_s,), rig.lamp.shutter_s, loaded)
@@ -354,7 +354,7 @@ def _schedule(steps: Sequence[Step], hidden: tuple[Pose, ...], loaded: Loaded) -
 def _darks_s(exposures_s: Sequence[float], cover_s: float, loaded: Loaded) -> float:
     """Return the duration of darkening, the darks of these exposures, and lighting again."""
     frames = loaded.protocol.dark_frames
-    return 2 * cover_s + sum(_frames_s(frames, e, loaded.rig) for e in exposures_s)
+    return 2 * cover_s + sum(frames_s(frames, e, loaded.rig) for e in exposures_s)
 
 
 def _homing_s(rig: Rig) -> float:
@@ -362,5 +362,6 @@ def _homing_s(rig: Rig) -> float:
     return sum(axis.homing_s for axis in axes if not isinstance(axis, HandAxis))
 
 
-def _frames_s(frames: int, exposure_s: float, rig: Rig) -> float:
+def frames_s(frames: int, exposure_s: float, rig: Rig) -> float:
+    """Return the time in seconds that so many frames take."""
     return frames * (exposure_s + rig.camera.frame_overhead_s)

@@ -36,10 +36,8 @@ log = logging.getLogger(__name__)
 interlocks = logging.getLogger("acquisition.interlocks")
 
 TURNS = 6  # over the angles of one sweep, before the scan gives up on what is missing
-_KEEP = (
-    0.35,
-    1.25,
-)  # of the target: a known exposure within these needs no other, and no calibration
+# Of the target: a known exposure within these shares needs no other, and no calibration.
+_KEEP = (0.35, 1.25)
 _ENOUGH, _SLOWER = 0.9, 1.5  # share of angles with a frame; factor of the time of a frame
 _LEAST_WAIT_S = 0.001
 _STUCK_S = 0.5  # without progress the axis has stopped

@@ -62,6 +62,20 @@ def emulated(name: str, mechanics: Mechanics = MECHANICS) -> Iterator[EmulatedSt
         with_stage.stage.close()
 
 
+@contextmanager
+def repaired(emulated: EmulatedStage) -> Iterator[EmulatedStage]:
+    """The same controller, repaired and reopened."""
+    emulated.wire.clear_faults()
+    emulated.motor.alarm = ""
+    emulated.motor.stop()
+    emulated.stage.close()
+    stage = emulated.reopen()
+    try:
+        yield replace(emulated, stage=stage)
+    finally:
+        stage.close()
+
+
 def port_of(wire: PtyWire | TcpWire) -> str:
     """The port that a driver opens."""
     return wire.port if isinstance(wire, PtyWire) else f"tcp://{wire.host}:{wire.port}"

@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -31,7 +30,7 @@ from sim.faults.faults import Faults
 from sim.faults.triggers import Triggers, When
 from sim.scene.scene import Scene
 from tests.support.scans import changed, small_scan
-from tests.support.stages.emulated_stages import EMULATED_STAGES, EmulatedStage
+from tests.support.stages.emulated_stages import EMULATED_STAGES, EmulatedStage, repaired
 from tests.support.whole_scans import faulty_scan
 from tests.support.whole_scans.faulty_scan import ScanResult, WatchedDevice, require_reported
 
@@ -247,15 +246,3 @@ def require_still(emulated: EmulatedStage) -> None:
     while emulated.motor.moving:
         assert time.monotonic() < end_s
         time.sleep(0.005)
-
-
-@contextmanager
-def repaired(emulated: EmulatedStage) -> Iterator[EmulatedStage]:
-    """The same controller, repaired and reopened."""
-    emulated.wire.clear_faults()
-    emulated.motor.alarm = ""
-    emulated.motor.stop()
-    emulated.stage.close()
-    stage = emulated.reopen()
-    yield replace(emulated, stage=stage)
-    stage.close()

@@ -8,8 +8,7 @@ one at which the motor was during its frame, and a resume completes the scan.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -30,7 +29,7 @@ from sim.scene.camera import SimulatedCamera
 from sim.scene.scene import Scene
 from tests.support.flights.fly_scans import fly_scan
 from tests.support.scans import changed
-from tests.support.stages.emulated_stages import EMULATED_STAGES, EmulatedStage
+from tests.support.stages.emulated_stages import EMULATED_STAGES, EmulatedStage, repaired
 from tests.support.whole_scans import faulty_scan
 from tests.support.whole_scans.faulty_scan import ScanResult, WatchedDevice, require_reported
 
@@ -126,18 +125,6 @@ def scan(loaded: Loaded, emulated: EmulatedStage, folder: Path, triggers: Trigge
         low, high = sorted(witness.ranges_deg[reading.step])
         assert low - AWAY_DEG < reading.theta_r_deg < high + AWAY_DEG
     return result
-
-
-@contextmanager
-def repaired(emulated: EmulatedStage) -> Iterator[EmulatedStage]:
-    """The same controller, repaired and reopened."""
-    emulated.wire.clear_faults()
-    emulated.motor.alarm = ""
-    emulated.motor.stop()
-    emulated.stage.close()
-    stage = emulated.reopen()
-    yield replace(emulated, stage=stage)
-    stage.close()
 
 
 @pytest.mark.slow
