@@ -52,8 +52,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """One more worker than cores: many tests wait for a process or a device now and then."""
-    return len(os.sched_getaffinity(0)) + 1
+    """Two more workers than cores: many tests wait for a process or a device now and then."""
+    return len(os.sched_getaffinity(0)) + 2
 
 
 @pytest.hookimpl(wrapper=True)
@@ -92,14 +92,15 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line(line)
 
 
-@pytest.fixture(scope="module")
-def without_charts() -> Iterator[None]:
-    """Reports of commands in this process have empty pictures, for tests of other subjects.
+@pytest.fixture(scope="module", autouse=True)
+def _charts_where_asked_for(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Reports made in this process have empty pictures, except in modules marked `charts`.
 
     Drawing takes more than half of the time of a small run.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("analysis.report.figure_list.embedded_svg", lambda *_: "<svg></svg>")
+        if not request.node.get_closest_marker("charts"):
+            patch.setattr("analysis.report.figure_list.embedded_svg", lambda *_: "<svg></svg>")
         yield
 
 

@@ -30,9 +30,22 @@ pytestmark = [
         shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"
     ),
 ]
-QUICK = ("homing_s: 2.0", "homing_s: 0.2")  # in tests of something else than homing
 RIG = CONFIGS / "rigs" / "emulated.yaml"
 TRUTH = {"albedo": 0.80, "sigma_deg": 20.0, "ks": 0.076}
+
+
+def quick(rig: str) -> str:
+    """Shorten homing, and give the camera pixels twice as wide: rendering takes most of the time.
+
+    Of an axis that moves each frame is rendered several times.
+    """
+    changes = {"homing_s: 2.0": "homing_s: 0.2", "width_px: 320": "width_px: 160",
+               "height_px: 256": "height_px: 128", "row_px: 128.5": "row_px: 64.0",
+               "column_px: 158.0": "column_px: 78.75"}  # fmt: skip
+    for old, new in changes.items():
+        assert old in rig
+        rig = rig.replace(old, new)
+    return rig
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +67,7 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ReadyProcess]:
 def run(tmp_path_factory: pytest.TempPathFactory, protocol: Path, command: ReadyProcess) -> Path:
     folder = tmp_path_factory.mktemp("emulated")
     rig = folder / "rig.yaml"
-    rig.write_text(RIG.read_text().replace(*QUICK))
+    rig.write_text(quick(RIG.read_text()))
     done = command.run("run", protocol, "--rig", rig, "--out", folder / "run")
     assert done.returncode == 0, done.stderr
     return folder / "run"
@@ -73,7 +86,7 @@ def test_each_point_agrees_with_the_simulated_rig(
 ) -> None:
     """With the same optics and lamp only noise, drift and angle errors differ."""
     simulated_rig = tmp_path / "simulated.yaml"
-    simulated_rig.write_text(simulated(RIG.read_text()))
+    simulated_rig.write_text(simulated(quick(RIG.read_text())))
     done = gonio_here("run", protocol, "--rig", simulated_rig, "--out", tmp_path / "run")
     assert done.returncode == 0, done.stderr
     assert_same_within_noise(points(run), points(tmp_path / "run"))
@@ -104,9 +117,7 @@ def test_an_exposure_that_the_camera_does_not_make_ends_the_scan(
 ) -> None:
     """The control takes and reads back any exposure; the sensor makes 0.5 ms at most."""
     rig = tmp_path / "rig.yaml"
-    rig.write_text(
-        RIG.read_text().replace(*QUICK) + "  camera_defects: {longest_exposure_s: 0.0005}\n"
-    )
+    rig.write_text(quick(RIG.read_text()) + "  camera_defects: {longest_exposure_s: 0.0005}\n")
     done = command.run("run", protocol, "--rig", rig, "--out", tmp_path / "run")
     assert done.returncode == 3
     assert re.search("camera: (counts at|its frames come every)", done.stderr), done.stderr
@@ -117,7 +128,7 @@ def test_a_stopped_scan_is_resumed_where_it_ended(
     tmp_path: Path, protocol: Path, command: ReadyProcess
 ) -> None:
     folder, rig = tmp_path / "run", tmp_path / "rig.yaml"
-    rig.write_text(RIG.read_text().replace(*QUICK))
+    rig.write_text(quick(RIG.read_text()))
     process = command.start("run", protocol, "--rig", rig, "--out", folder)
     wait_for_readings(folder, 5, command)
     os.kill(process, signal.SIGTERM)
@@ -207,12 +218,12 @@ def test_an_axis_that_turns_is_measured_at_the_angles_of_its_frames(
 ) -> None:
     """A steep lobe, of which a wrong angle or a blur would be seen; the model is the true one."""
     text = yaml.safe_load(protocol.read_text()) | {"motion": "fly", "frames_per_point": 1}
-    views = {"start": -70.0, "stop": 0.0, "num": 15}
+    views = {"start": -60.0, "stop": -10.0, "num": 11}
     text["sweeps"] = [{"theta_i_deg": [45.0], "dphi_deg": [0.0], "theta_r_deg": views}]
     text["simulated_sample"]["parameters"] |= {"sigma_deg": 8.0, "ks": 0.3}
     flown, rig, folder = tmp_path / "flown.yaml", tmp_path / "rig.yaml", tmp_path / "run"
     flown.write_text(yaml.safe_dump(text))
-    rig.write_text(RIG.read_text().replace(*QUICK))
+    rig.write_text(quick(RIG.read_text()))
     done = command.run("run", flown, "--rig", rig, "--out", folder, "--json")
     assert done.returncode == 0, done.stderr
     fit = json.loads(done.stdout)
@@ -222,8 +233,8 @@ def test_an_axis_that_turns_is_measured_at_the_angles_of_its_frames(
             "SELECT theta_r_deg, blur_deg, u_latency_deg FROM reading WHERE kind = 'point'"
         ).fetchall()
         found = record.execute("SELECT text FROM event WHERE kind = 'latency'").fetchall()
-    assert len(rows) == 15
-    assert np.ptp([angle for angle, _, _ in rows]) > 65
+    assert len(rows) == 11
+    assert np.ptp([angle for angle, _, _ in rows]) > 45
     assert all(blur > 0 and u != 0 for _, blur, u in rows)
     latency_ms = float(found[0][0].split("s: ")[1].split()[0])
     assert abs(latency_ms) < 20.0  # read-out and line

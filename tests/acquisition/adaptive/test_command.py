@@ -19,8 +19,6 @@ from tests.support.command import gonio_here as gonio
 from tests.support.scans import small_demo
 from tests.support.timing.deadline import wait_for
 
-pytestmark = pytest.mark.usefixtures("without_charts")
-
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -18,8 +18,6 @@ from tests.support.command import gonio_here as gonio
 from tests.support.paths import ROOT
 from tests.support.scans import small_demo
 
-pytestmark = pytest.mark.usefixtures("without_charts")
-
 CURET = ROOT.parent / "shared" / "data" / "curet"
 TWO = "lambert,oren_nayar"
 VIEWS = np.arange(-70.0, 71.0, 10.0)

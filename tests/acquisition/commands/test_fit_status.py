@@ -14,8 +14,6 @@ from instrument.errors import AllFlagged, NotDetermined
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import TWO_MODELS, small_demo
 
-pytestmark = pytest.mark.usefixtures("without_charts")
-
 FILES = {"record.sqlite", "measurements.csv", "fit.json", "report.html"}
 COMPLETE = "the run is complete: all readings are recorded and reported"
 

@@ -22,8 +22,6 @@ from tests.support.command import gonio_here as gonio
 from tests.support.scans import TWO_MODELS, small_demo
 from tests.support.timing.deadline import wait_for
 
-pytestmark = pytest.mark.usefixtures("without_charts")
-
 METADATA = "{sample_id: F-17, operator: Jürgen, wavelength_nm: 550, notes: 'two, \"three\"'}"
 
 

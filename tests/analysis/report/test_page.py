@@ -23,6 +23,8 @@ from instrument.geometry import FloatArray
 from instrument.record.reading import Preview
 from tests.support.analysis.report_data import NAN, data_of, png, svgs, without_tile, words
 
+pytestmark = pytest.mark.charts
+
 HOSTILE = "<script>alert('1')</script>\"&\x00\udc80 $\\frac$"
 
 

@@ -15,6 +15,8 @@ from analysis.report.style import format_value
 from analysis.report.sweeps import group_sweeps
 from tests.support.analysis.report_data import data_of, svgs, without_tile
 
+pytestmark = pytest.mark.charts
+
 
 @pytest.mark.parametrize("tile", [True, False])
 def test_each_text_has_the_direction_value_and_flag_of_its_point(tile: bool) -> None:

@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from io import FileIO
 from pathlib import Path
 
 from acquisition.engine.engine import Engine
@@ -90,17 +91,16 @@ class Killer:
         reduced = reduce(record.readings(), self._loaded.protocol, record.checks())
         return [float(value) for value in reduced.brdf]
 
-    def killed(self, run: Path, waits: Callable[[int], None], at: int = -1) -> set[int]:
-        """Run or resume in a fork, kill it once `waits` returns, and return its accepted steps."""
+    def killed(self, run: Path, waits: Callable[[int, FileIO], bytes], at: int = -1) -> set[int]:
+        """Run or resume in a fork that `waits` sees killed; return its accepted steps."""
         ours, theirs = os.pipe()
         child = os.fork()
         if child == 0:
             os.close(ours)
             self._be_killed(run, theirs, at)
         os.close(theirs)
-        waits(child)
-        with os.fdopen(ours, "rb") as told:
-            return set(told.read())
+        with os.fdopen(ours, "rb", buffering=0) as told:
+            return set(waits(child, told) + told.read())
 
     def _be_killed(self, run: Path, told: int, at: int) -> None:
         if at >= 0:
@@ -134,11 +134,17 @@ class Killer:
         shutil.rmtree(run)
 
 
-def _after(seconds: float) -> Callable[[int], None]:
-    def waits(child: int) -> None:
+def _after(steps: int, seconds: float) -> Callable[[int, FileIO], bytes]:
+    """Kill that time after so many steps: scans are under way however fast the machine is."""
+
+    def waits(child: int, told: FileIO) -> bytes:
+        accepted = b""
+        while len(accepted) < steps and (more := told.read(1)):
+            accepted += more
         time.sleep(seconds)  # the random moment of the kill; no event is awaited
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
+        return accepted
 
     return waits
 
@@ -148,13 +154,18 @@ def at_random(killer: Killer, folder: Path, kills: int, seed: int) -> None:
     draw, run = random.Random(seed), folder / "run"
     begun_s = time.monotonic()
     scan(folder / "timed", killer._loaded, killer._plan, lambda _: None)
-    lasts_s = time.monotonic() - begun_s
+    steps = len(killer._plan.steps)
+    of_a_step_s = (time.monotonic() - begun_s) / steps
+
+    def moment(left: int) -> Callable[[int, FileIO], bytes]:
+        return _after(draw.randint(0, left), draw.uniform(0, 2 * of_a_step_s))
+
     while killer.outcome.kills < kills:
-        accepted = killer.killed(run, _after(draw.uniform(0, 1.1 * lasts_s)))
+        accepted = killer.killed(run, moment(steps))
         killer.look(run, accepted)
         while draw.random() < 0.3 and killer.outcome.kills < kills:
             killer.outcome.killed_twice += 1
-            accepted |= killer.killed(run, _after(draw.uniform(0, lasts_s)))
+            accepted |= killer.killed(run, moment(steps - len(accepted)))
             killer.look(run, accepted)
         killer.finish(run)
 
@@ -163,8 +174,9 @@ def at_entries(killer: Killer, folder: Path, stride: int) -> None:
     """Kill before every n-th file operation, until the scan finishes."""
     run, at, ended = folder / "run", 1, [-1]
 
-    def waits(child: int) -> None:
+    def waits(child: int, _: FileIO) -> bytes:
         ended.append(os.waitpid(child, 0)[1])
+        return b""
 
     while ended[-1] != 0:  # until no kill happens: there are no more entries
         steps = killer.killed(run, waits, at)

@@ -17,8 +17,6 @@ from sim.faults.faults import VARIABLE
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import small_demo
 
-pytestmark = pytest.mark.usefixtures("without_charts")
-
 RESULTS = ("measurements.csv", "fit.json", "report.html")
 
 

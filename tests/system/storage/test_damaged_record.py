@@ -17,8 +17,6 @@ from tests.support.command import gonio_here as gonio
 from tests.support.storage.bit_flips import flips
 from tests.support.strangers.run_folders import run_few_points
 
-pytestmark = pytest.mark.usefixtures("without_charts")
-
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -28,8 +28,6 @@ from tests.support.ready.ready_process import ReadyProcess
 from tests.support.scans import shortest_scan, small_demo, undated
 from tests.support.storage.holder import Holder, held
 
-pytestmark = pytest.mark.usefixtures("without_charts")
-
 LOADED = shortest_scan()
 PLAN = make_plan(LOADED)
 

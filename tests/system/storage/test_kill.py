@@ -24,7 +24,7 @@ def test_nothing_is_lost_or_changed_by_kills_at_random_moments(
     outcome = json.loads(run_scan_killer([tmp_path, kills, 2026], {}, 3600))
     record_testsuite_property("kills at random moments", outcome)
     assert outcome["kills"] >= kills
-    assert outcome["accepted_before"] > kills / 3  # scans were under way, also where load has grown
+    assert outcome["accepted_before"] > kills  # scans were under way
     assert outcome["killed_twice"] > 0
     assert nothing_lost(outcome), outcome
 

@@ -14,8 +14,6 @@ from tests.support.command import gonio_here as gonio
 from tests.support.storage.older_records import as_version
 from tests.support.strangers.run_folders import Sent, run_few_points
 
-pytestmark = pytest.mark.usefixtures("without_charts")
-
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -17,8 +17,6 @@ from tests.support.command import finished_run
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import TWO_MODELS, small_demo
 
-pytestmark = pytest.mark.usefixtures("without_charts")
-
 TILE = re.compile(r"white_tile: .*")
 EXACT_TILE = "white_tile: {reflectance: 0.99, u_reflectance: 0.0, theta_r_deg: 10.0}"
 

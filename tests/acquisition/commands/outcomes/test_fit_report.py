@@ -12,6 +12,8 @@ import pytest
 from tests.support.analysis.report_data import words
 from tests.support.command import gonio_here as gonio
 
+pytestmark = pytest.mark.charts
+
 HEAD = "theta_i_deg,theta_r_deg,dphi_deg,brdf"
 
 

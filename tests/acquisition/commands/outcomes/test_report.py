@@ -12,6 +12,8 @@ from tests.support.command import finished_run
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import TWO_MODELS, small_demo
 
+pytestmark = pytest.mark.charts
+
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -20,6 +20,8 @@ from analysis.report.style import svg_file
 from analysis.report.sweeps import group_sweeps
 from tests.support.analysis.report_data import NAN, data_of
 
+pytestmark = pytest.mark.charts
+
 
 def budgeted(sources: int) -> ReportData:
     """Points with so many sources of random size; one is unknown at the first point."""
