@@ -192,9 +192,12 @@ def test_the_watchdogs_stop_does_not_end_the_next_move(
 
 @pytest.mark.parametrize("setup", ["newport"], indirect=True)
 def test_a_pause_too_short_to_matter_ends_nothing(setup: Setup) -> None:
+    """It begins at a status; what passes until the next one counts with it."""
     setup.stage.start_move(20.0)
     wait_until(lambda: setup.motor.position_deg > 1.0)
-    setup.clock.pause(1.5 * PAUSE_S)
+    answered_s = setup.stage.watchdog._answered_s
+    wait_until(lambda: setup.stage.watchdog._answered_s > answered_s)
+    setup.clock.pause(1.1 * PAUSE_S)
     assert setup.stage.wait() == pytest.approx(20.0, abs=1e-2)
 
 
