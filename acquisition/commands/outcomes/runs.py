@@ -13,6 +13,7 @@ from acquisition.results.run_folder import load_run_inputs
 from acquisition.terminal.console import out, print_lines, print_notes, print_text
 from acquisition.terminal.layout import table_lines
 from instrument.errors import GonioError, InputError
+from instrument.record.reading import batches_of
 from instrument.record.record import FILE_NAME, Record
 from instrument.text.atomic_file import read_file
 from instrument.text.quoting import printable
@@ -25,15 +26,16 @@ _NOT_FITTED = "not fitted"
 class Listed:
     """One run, as the list shows it.
 
-    readings, planned: numbers of steps, references among them. model, verdict: those of fit.json,
-    None without one. refused: why the run cannot be read, empty if it can.
+    readings, planned: numbers of steps, references among them; of a scan that still chooses its
+    geometries, planned is None. model, verdict: those of fit.json, None without one. refused: why
+    the run cannot be read, empty if it can.
     """
 
     run: str
     started_utc: str = ""
     sample: str = ""
     readings: int = 0
-    planned: int = 0
+    planned: int | None = 0
     model: str | None = None
     verdict: str | None = None
     refused: str = ""
@@ -43,6 +45,8 @@ class Listed:
         """State of the scan: complete, or the readings made so far."""
         if self.refused:
             return "unreadable"
+        if self.planned is None:
+            return f"{self.readings} so far"
         done = self.planned and self.readings >= self.planned
         return "complete" if done else f"{self.readings} of {self.planned}"
 
@@ -83,7 +87,9 @@ def listed(run: Path) -> Listed:
         with Record.open(run) as record:
             loaded = load_run_inputs(record)
             started, readings = record.meta("started_utc") or "", len(record.readings())
-            planned = int(record.meta("steps") or 0)
+            choices = batches_of(record.events())
+            chooses = bool(choices) and not choices[-1].end
+            planned = None if chooses else int(record.meta("steps") or 0)
     except (GonioError, ValueError) as error:
         return Listed(run=name, refused=str(error))
     model, verdict = _fit_of(run)

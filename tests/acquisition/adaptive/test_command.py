@@ -46,6 +46,8 @@ def run(small: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, st
         done = gonio("run", small, "--until", "albedo=0.02", "--budget-min", 30, "--out", folder)
     assert done.returncode == 4, done.stderr
     assert "until u(albedo) 0.02, at most 30 min, of 30 geometries" in done.stderr
+    (listed,) = json.loads(gonio("runs", folder, "--json").stdout)["runs"]
+    assert (listed["state"], listed["planned"]) == ("9 so far", None)
     resumed = gonio("resume", folder, "--yes")
     assert resumed.returncode == 0, resumed.stderr
     return folder, done.stderr + resumed.stderr + resumed.stdout
