@@ -32,10 +32,10 @@ compiled: $(VENV)/.installed-dev
 	-@nice $(BIN)/pytest --collect-only -q -m "not hil and not waits" > /dev/null
 
 lint: $(VENV)/.installed-dev
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
+	nice $(BIN)/ruff check .
+	nice $(BIN)/ruff format --check .
 	nice $(BIN)/mypy
-	$(BIN)/lint-imports
+	nice $(BIN)/lint-imports
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

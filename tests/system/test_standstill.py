@@ -8,9 +8,13 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 
+import pytest
+
 from tests.support.paths import ROOT
+from tests.support.timing import standstill
 from tests.support.timing.deadline import wait_for
 from tests.support.timing.standstill import (
     KEPT_WAITING_S,
@@ -130,6 +134,25 @@ def test_a_thread_of_the_test_that_is_kept_from_running_is_a_standstill() -> Non
             while standstills.kept_waiting_s <= KEPT_WAITING_S:
                 assert time.monotonic() < float(until_s)
     assert standstills.cause
+
+
+def test_short_waits_of_several_threads_in_turn_are_a_standstill(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One of them has ended before the last look."""
+    looks = [{1: 5.0}, {1: 5.04, 2: 0.03}, {1: 5.05, 3: 0.04}]
+    monkeypatch.setattr(standstill, "threads_waited_s", lambda _: dict(looks[0]))
+    with Standstills() as standstills:
+        for look in looks[1:]:
+            seen = standstills.looked
+            looks[0] = look
+            wait_for(partial(_has_looked, standstills, seen + 2), "two looks")
+    assert standstills.kept_waiting_s == pytest.approx(0.12)
+    assert standstills.cause
+
+
+def _has_looked(standstills: Standstills, times: int) -> bool:
+    return standstills.looked >= times
 
 
 @contextmanager
