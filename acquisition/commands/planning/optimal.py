@@ -52,6 +52,11 @@ def show_optimal_plan(
     """
     _check_files(options)
     loaded = load_protocol(protocol_path, rig_path, check_model=check_model)
+    if loaded.protocol.motion == "fly":
+        raise InputError(
+            f"{protocol_path}: motion: fly: a turning axis does not stop at chosen geometries; "
+            "allowed: stepped"
+        )
     sample = assumed_sample(options.like, loaded)
     goal = None if options.until is None else goal_of(options.until, sample, loaded)
     asked = asked_parameters(options.wanted, sample, loaded) if goal is None else list(goal.u)

@@ -112,3 +112,13 @@ def test_a_mistake_ends_with_2_and_writes_nothing(
     assert words in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["taken.yaml"]
     assert (tmp_path / "taken.yaml").read_text() == "mine"
+
+
+def test_a_scan_that_does_not_stop_has_no_chosen_geometries(protocol: Path, tmp_path: Path) -> None:
+    flown, out = protocol.with_name("flown.yaml"), tmp_path / "few.yaml"
+    flown.write_text(protocol.read_text() + "motion: fly\n")
+    for option in (("--optimal", 8), ("--until", "sigma_deg=0.5")):
+        done = gonio_here("plan", flown, *option, "--out", out)
+        assert done.returncode == 2
+        assert "flown.yaml: motion: fly" in done.stderr
+        assert not out.exists()
