@@ -17,6 +17,7 @@ import typer
 
 from acquisition.calibrate_cli import calibrate
 from acquisition.cli_parts import Commands, Json, ProtocolFile, RigFile, RigOnly, RunFolder
+from acquisition.gallery_cli import gallery
 from acquisition.new_cli import new
 from acquisition.outcomes_cli import compare, export, map_, runs
 from acquisition.plan_cli import plan
@@ -252,7 +253,7 @@ def report(
 
 
 app.command("map")(map_)
-for command in (export, compare, runs):
+for command in (export, compare, runs, gallery):
     app.command()(command)
 
 

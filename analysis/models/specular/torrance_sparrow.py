@@ -25,9 +25,11 @@ from analysis.models.validity import valid_unless_both_graze
 from instrument.geometry import FloatArray, Geometry
 
 KS = Parameter("ks", "1", 0.0, 10.0, 0.1, scale=True)
-# A lobe narrower than this is a mirror image of the lamp, which no BRDF describes.
+# A fit's lobe narrower than this is a mirror image of the lamp: no lens and no scan resolve it.
 SIGMA_DEG = Parameter("sigma_deg", "degrees", 0.5, 60.0, 20.0)
 LOBE_SIGMA_DEG = replace(SIGMA_DEG, name="lobe_sigma_deg", default=10.0)
+# The bare formulas hold for the papers' narrowest lobes, too: 1991, figure 13.
+ANY_SIGMA_DEG = replace(SIGMA_DEG, low=0.01)
 
 # Function of an angle in radians: density in 1/sr of a slope theta_a, or reflectance at theta'.
 OfAngle = Callable[[FloatArray], FloatArray]
@@ -98,7 +100,7 @@ def torrance_sparrow_full(
 
 def gaussian(sigma_deg: float) -> OfAngle:
     """The Gaussian density (32) of width `sigma_deg` as a function of θ_a in radians."""
-    sigma = math.radians(SIGMA_DEG.check(sigma_deg))
+    sigma = math.radians(ANY_SIGMA_DEG.check(sigma_deg))
     return lambda theta_a: slope_density(theta_a, sigma)
 
 
@@ -171,7 +173,7 @@ def gaussian_normalisation(sigma: float) -> float:
     """The c of equation (32) in 1/sr for sigma in radians: P integrates to 1 over the hemisphere.
 
     Gauss-Legendre quadrature of 64 points up to 9 sigma (less than 3e-18 lies beyond): exact
-    to about 1e-14 for sigma from 0.5 to 70 degrees.
+    to about 1e-14 for sigma from 0.01 to 70 degrees.
     """
     return 1 / (2 * math.pi * _slope_integral(sigma, 0))
 

@@ -16,7 +16,12 @@ import math
 import numpy as np
 
 from analysis.models.base import Model, Parameter, Validity
-from analysis.models.specular.torrance_sparrow import SIGMA_DEG, half_vector, tangential_squared
+from analysis.models.specular.torrance_sparrow import (
+    ANY_SIGMA_DEG,
+    SIGMA_DEG,
+    half_vector,
+    tangential_squared,
+)
 from analysis.models.validity import either_grazes, valid_except
 from instrument.geometry import FloatArray, Geometry
 
@@ -119,7 +124,7 @@ def moving_source(
 
 def lobe_shape(geometry: Geometry, sigma_deg: float) -> FloatArray:
     """exp(-α²/2σ²), 0 to 1, of the geometry's shape: 1991, (56), α the half-vector's θ_a."""
-    sigma = math.radians(SIGMA_DEG.check(sigma_deg))
+    sigma = math.radians(ANY_SIGMA_DEG.check(sigma_deg))
     return np.exp(-0.5 * np.square(half_vector(geometry)[0] / sigma))
 
 

@@ -242,8 +242,8 @@ def test_the_half_vector_keeps_its_digits_near_the_mirror_direction() -> None:
 
 
 def test_a_wrong_width_is_named() -> None:
-    with pytest.raises(ValueError, match=r"sigma_deg = 0\.1 degrees; allowed: 0\.5 to 60"):
-        gaussian(0.1)
+    with pytest.raises(ValueError, match=r"sigma_deg = 0\.001 degrees; allowed: 0\.01 to 60"):
+        gaussian(0.001)
     assert gaussian(20.0)(np.array(0.1)) == slope_density(np.array(0.1), math.radians(20))
 
 
@@ -278,3 +278,25 @@ def test_a_narrow_lobe_at_normal_incidence_reflects_ks() -> None:
     # 3 degrees 1 - 0.003).
     found = hemispherical_reflectance("torrance_sparrow", 0.0, ks=0.2, sigma_deg=3.0)
     assert found == pytest.approx(0.2, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("sigma", "theta_i"), np.random.default_rng(13).uniform((-2, 0), (-0.3, 70), (12, 2)).tolist()
+)
+def test_lobes_narrower_than_a_fit_has_are_right(sigma: float, theta_i: float) -> None:
+    """Down to the 0.01 degrees of 1991, figure 13: the shape in the plane, and all of the light.
+
+    A narrow lobe is a mirror: it reflects the Fresnel factor, here 1, but for terms of sigma^2.
+    """
+    sigma = 10**sigma
+    off = np.linspace(-8, 8, 161) * sigma
+    mirror = Geometry.from_degrees(theta_i=theta_i, theta_r=-(theta_i + 2 * off), dphi=0.0)
+    found = torrance_sparrow_full(mirror, 1.0, sigma)
+    shape = np.exp(-0.5 * (off / sigma) ** 2)
+    i, r = math.radians(theta_i), np.radians(theta_i + 2 * off)
+    expected = gaussian_normalisation(math.radians(sigma)) * shape / (4 * math.cos(i) * np.cos(r))
+    np.testing.assert_allclose(found, expected / np.cos(np.radians(off)), rtol=1e-8)
+    # In the half-vector's coordinates dω_r = 4 cos(θ') dω_a, and here cos(θ') is about cos(θ_i).
+    radial = np.linspace(0, 9, 4001) * math.radians(sigma)
+    P = gaussian(sigma)(radial)
+    assert np.trapezoid(P * 2 * np.pi * np.sin(radial), radial) == pytest.approx(1, rel=1e-5)

@@ -199,9 +199,29 @@ def test_the_closed_domain_and_both_sides_of_validity() -> None:
 @pytest.mark.parametrize("framework", [moving_sensor, moving_source])
 def test_wrong_widths_are_named(framework: Callable[..., FloatArray]) -> None:
     for wrong in (-5.0, 0.0, math.nan):
-        with pytest.raises(ValueError, match=f"^sigma_deg = {wrong:g} degrees; allowed: 0.5 to 60"):
+        with pytest.raises(
+            ValueError, match=f"^sigma_deg = {wrong:g} degrees; allowed: 0.01 to 60"
+        ):
             framework(scan(10.0, 10.0), 1.0, 1.0, wrong, 1.0, 1.0)
         with pytest.raises(
             ValueError, match=f"^spike_width_deg = {wrong:g} degrees; allowed: 0.05"
         ):
             framework(scan(10.0, 10.0), 1.0, 1.0, 10.0, 1.0, wrong)
+
+
+@pytest.mark.parametrize("framework", [moving_sensor, moving_source])
+@pytest.mark.parametrize(
+    ("sigma", "theta"), np.random.default_rng(61).uniform((-2, 0), (-0.3, 80), (8, 2)).tolist()
+)
+def test_narrow_lobes_are_gaussians_about_the_mirror(
+    framework: Callable[..., FloatArray], sigma: float, theta: float
+) -> None:
+    """1991, figure 13 (a) and (b): σ of 0.01 and 0.1 degrees, narrower than a fit allows."""
+    sigma = 10**sigma
+    theta_r = theta + np.linspace(-10, 10, 81) * sigma
+    theta_r = theta_r[theta_r > 0]
+    at = Geometry.from_degrees(theta_i=theta, theta_r=theta_r, dphi=180.0)
+    expected = np.exp(-0.5 * ((theta_r - theta) / 2 / sigma) ** 2)
+    if framework is moving_sensor:
+        expected /= np.cos(np.radians(theta_r))
+    np.testing.assert_allclose(framework(at, 0.0, 1.0, sigma, 0.0, 1.0), expected, rtol=1e-8)

@@ -1,0 +1,1 @@
+"""Commands about the papers that the models come from."""
