@@ -275,3 +275,18 @@ def test_without_a_tile_errors_of_the_tile_do_not_count() -> None:
     assert np.all(applied.factor == 1)
     assert [error.name for error in applied.shared] == [NONLINEAR, TILT]
     assert all(np.all(np.isfinite(error.u_relative)) for error in applied.shared)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_polarisation_of_values_in_any_unit_is_that_of_absolute_ones(seed: int) -> None:
+    """Without a tile the unit differs from one setting of the lamp to the next."""
+    random = np.random.default_rng(seed)
+    sample = (MATT, GLOSSY)[seed % 2]
+    places = [(i, 0.0, r) for i in random.uniform(10.0, 70.0, 2) for r in np.linspace(-80, 80, 11)]
+    lines = {"u_polarisation_lamp": 0.05, "u_polarisation_camera": 0.02}
+    known = readings(BASE, places, brdf(sample, places), **lines)
+    levels = np.repeat(10 ** random.uniform(-6, 6) * random.uniform(0.7, 1.4, 2), 11)
+    bare = replace(known, tiles=[None] * 22, absolute=False, value=known.value * levels)
+    for ours, other in zip(polarisation_effects(bare), polarisation_effects(known), strict=True):
+        most = 0.03 * np.max(np.abs(other.by_one))
+        assert np.allclose(ours.by_one, other.by_one, atol=most, rtol=0), ours.name
