@@ -22,6 +22,7 @@ from tests.support.command import gonio, gonio_here
 from tests.support.paths import CONFIGS
 from tests.support.ready.ready_process import ReadyProcess
 from tests.support.scans import TWO_MODELS, small_demo
+from tests.support.whole_scans.emulated_rig import EMULATED_RIG, quick_emulated_rig
 from tests.support.whole_scans.simulated_rig import assert_same_within_noise, points, simulated
 
 pytestmark = [
@@ -30,22 +31,7 @@ pytestmark = [
         shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"
     ),
 ]
-RIG = CONFIGS / "rigs" / "emulated.yaml"
 TRUTH = {"albedo": 0.80, "sigma_deg": 20.0, "ks": 0.076}
-
-
-def quick(rig: str) -> str:
-    """Shorten homing, and give the camera pixels twice as wide: rendering takes most of the time.
-
-    Of an axis that moves each frame is rendered several times.
-    """
-    changes = {"homing_s: 2.0": "homing_s: 0.2", "width_px: 320": "width_px: 160",
-               "height_px: 256": "height_px: 128", "row_px: 128.5": "row_px: 64.0",
-               "column_px: 158.0": "column_px: 78.75"}  # fmt: skip
-    for old, new in changes.items():
-        assert old in rig
-        rig = rig.replace(old, new)
-    return rig
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +53,7 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ReadyProcess]:
 def run(tmp_path_factory: pytest.TempPathFactory, protocol: Path, command: ReadyProcess) -> Path:
     folder = tmp_path_factory.mktemp("emulated")
     rig = folder / "rig.yaml"
-    rig.write_text(quick(RIG.read_text()))
+    rig.write_text(quick_emulated_rig())
     done = command.run("run", protocol, "--rig", rig, "--out", folder / "run")
     assert done.returncode == 0, done.stderr
     return folder / "run"
@@ -86,7 +72,7 @@ def test_each_point_agrees_with_the_simulated_rig(
 ) -> None:
     """With the same optics and lamp only noise, drift and angle errors differ."""
     simulated_rig = tmp_path / "simulated.yaml"
-    simulated_rig.write_text(simulated(quick(RIG.read_text())))
+    simulated_rig.write_text(simulated(quick_emulated_rig()))
     done = gonio_here("run", protocol, "--rig", simulated_rig, "--out", tmp_path / "run")
     assert done.returncode == 0, done.stderr
     assert_same_within_noise(points(run), points(tmp_path / "run"))
@@ -117,7 +103,7 @@ def test_an_exposure_that_the_camera_does_not_make_ends_the_scan(
 ) -> None:
     """The control takes and reads back any exposure; the sensor makes 0.5 ms at most."""
     rig = tmp_path / "rig.yaml"
-    rig.write_text(quick(RIG.read_text()) + "  camera_defects: {longest_exposure_s: 0.0005}\n")
+    rig.write_text(quick_emulated_rig() + "  camera_defects: {longest_exposure_s: 0.0005}\n")
     done = command.run("run", protocol, "--rig", rig, "--out", tmp_path / "run")
     assert done.returncode == 3
     assert re.search("camera: (counts at|its frames come every)", done.stderr), done.stderr
@@ -128,7 +114,7 @@ def test_a_stopped_scan_is_resumed_where_it_ended(
     tmp_path: Path, protocol: Path, command: ReadyProcess
 ) -> None:
     folder, rig = tmp_path / "run", tmp_path / "rig.yaml"
-    rig.write_text(quick(RIG.read_text()))
+    rig.write_text(quick_emulated_rig())
     process = command.start("run", protocol, "--rig", rig, "--out", folder)
     wait_for_readings(folder, 5, command)
     os.kill(process, signal.SIGTERM)
@@ -157,7 +143,7 @@ def wait_for_readings(folder: Path, count: int, command: ReadyProcess) -> None:
 
 
 def test_devices_lists_the_identity_of_every_device(command: ReadyProcess) -> None:
-    done = command.run("devices", "--rig", RIG)
+    done = command.run("devices", "--rig", EMULATED_RIG)
     assert done.returncode == 0, done.stderr
     for word in ("SMC100", "Oriental Motor AZ", "Zaber device", "Y16 320 x 256 pixels"):
         assert word in done.stdout
@@ -166,7 +152,7 @@ def test_devices_lists_the_identity_of_every_device(command: ReadyProcess) -> No
 def test_grab_takes_a_frame_with_the_emulated_camera(tmp_path: Path) -> None:
     """As an operator starts it: the program restarts with the camera's library."""
     done = gonio(
-        "grab", "--rig", RIG, "-o", tmp_path / "aim.png", "--exposure-s", "0.001", "--json"
+        "grab", "--rig", EMULATED_RIG, "-o", tmp_path / "aim.png", "--exposure-s", "0.001", "--json"
     )
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["window_mean_dn"] > 200
@@ -176,7 +162,7 @@ def test_grab_takes_a_frame_with_the_emulated_camera(tmp_path: Path) -> None:
 def test_white_of_a_limited_range_is_saturated_or_the_camera_refused(
     tmp_path: Path, luma_range: str, command: ReadyProcess
 ) -> None:
-    rig = yaml.safe_load(RIG.read_text())
+    rig = yaml.safe_load(EMULATED_RIG.read_text())
     rig["camera"] |= {
         "pixel_format": "YUYV", "bit_depth": 8, "black_level_dn": 20.0,
         "read_noise_electrons": 60.0, "luma_range": luma_range,
@@ -197,7 +183,7 @@ def test_white_of_a_limited_range_is_saturated_or_the_camera_refused(
 
 
 def test_move_homes_and_moves_an_emulated_axis() -> None:
-    done = gonio_here("move", "dphi", "30", "--rig", RIG)
+    done = gonio_here("move", "dphi", "30", "--rig", EMULATED_RIG)
     assert done.returncode == 0, done.stderr
     assert float(done.stdout.split()[-2]) == pytest.approx(30.0, abs=0.01)
 
@@ -207,7 +193,7 @@ def test_a_missing_compiler_is_reported_before_the_run_folder_is_made(
 ) -> None:
     monkeypatch.setenv("PATH", "/nowhere")
     protocol = CONFIGS / "protocols" / "demo.yaml"
-    done = gonio_here("run", protocol, "--rig", RIG, "--out", tmp_path / "run")
+    done = gonio_here("run", protocol, "--rig", EMULATED_RIG, "--out", tmp_path / "run")
     assert done.returncode == 3
     assert "no C compiler" in done.stderr
     assert not (tmp_path / "run").exists()
@@ -223,7 +209,7 @@ def test_an_axis_that_turns_is_measured_at_the_angles_of_its_frames(
     text["simulated_sample"]["parameters"] |= {"sigma_deg": 8.0, "ks": 0.3}
     flown, rig, folder = tmp_path / "flown.yaml", tmp_path / "rig.yaml", tmp_path / "run"
     flown.write_text(yaml.safe_dump(text))
-    rig.write_text(quick(RIG.read_text()))
+    rig.write_text(quick_emulated_rig())
     done = command.run("run", flown, "--rig", rig, "--out", folder, "--json")
     assert done.returncode == 0, done.stderr
     fit = json.loads(done.stdout)

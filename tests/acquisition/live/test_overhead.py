@@ -23,14 +23,14 @@ import pytest
 from instrument.record.record import Record
 from tests.support.live.chromium import missing
 from tests.support.live.watching_browser import WatchingBrowser, watching_browser
-from tests.support.paths import CONFIGS, ROOT
+from tests.support.paths import ROOT
 from tests.support.scans import TWO_MODELS, small_demo
+from tests.support.whole_scans.emulated_rig import EMULATED_RIG, quick_emulated_rig
 
 pytest.importorskip("uvicorn", reason="the live page's libraries are not installed")
 pytestmark = pytest.mark.skipif(
     shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"
 )
-RIG = CONFIGS / "rigs" / "emulated.yaml"
 MOST = 1.02  # of the time of a scan that nobody watches
 MOST_OF_ONE = 1.15  # of one pair of short scans
 
@@ -58,10 +58,15 @@ def _read_all(line: socket.socket) -> None:
 
 
 def time_a_point_s(
-    folder: Path, protocol: Path, *, watched: bool, browser: WatchingBrowser | None = None
+    folder: Path,
+    protocol: Path,
+    rig: Path,
+    *,
+    watched: bool,
+    browser: WatchingBrowser | None = None,
 ) -> float:
     """Scan, watched by the browser and two clients or by nobody; return seconds a point."""
-    files: list[str | Path] = [protocol, "--rig", RIG, "--out", folder]
+    files: list[str | Path] = [protocol, "--rig", rig, "--out", folder]
     command = [sys.executable, "-m", "acquisition", "run", *files]
     with (
         subprocess.Popen(
@@ -86,13 +91,15 @@ def time_a_point_s(
     return (times[-1] - times[0]) / (len(times) - 1)
 
 
-def time_a_pair_s(folder: Path, protocol: Path, *, with_browser: bool) -> tuple[float, float]:
+def time_a_pair_s(
+    folder: Path, protocol: Path, rig: Path, *, with_browser: bool
+) -> tuple[float, float]:
     """Seconds a point of a scan that nobody watches, and of the same scan watched."""
-    alone_s = time_a_point_s(folder / "alone", protocol, watched=False)
+    alone_s = time_a_point_s(folder / "alone", protocol, rig, watched=False)
     if not with_browser:
-        return alone_s, time_a_point_s(folder / "watched", protocol, watched=True)
+        return alone_s, time_a_point_s(folder / "watched", protocol, rig, watched=True)
     with watching_browser() as browser:
-        watched_s = time_a_point_s(folder / "watched", protocol, watched=True, browser=browser)
+        watched_s = time_a_point_s(folder / "watched", protocol, rig, watched=True, browser=browser)
         browser.require_shown()
     return alone_s, watched_s
 
@@ -100,8 +107,9 @@ def time_a_pair_s(folder: Path, protocol: Path, *, with_browser: bool) -> tuple[
 @pytest.mark.real_time
 def test_two_clients_one_of_them_stalled_cost_a_scan_no_time(tmp_path: Path) -> None:
     """One pair of short scans, whose limit is therefore wide."""
-    protocol = small_demo(tmp_path, TWO_MODELS)
-    alone_s, watched_s = time_a_pair_s(tmp_path, protocol, with_browser=False)
+    protocol, rig = small_demo(tmp_path, TWO_MODELS), tmp_path / "rig.yaml"
+    rig.write_text(quick_emulated_rig())
+    alone_s, watched_s = time_a_pair_s(tmp_path, protocol, rig, with_browser=False)
     assert watched_s / alone_s < MOST_OF_ONE
 
 
@@ -119,7 +127,10 @@ def test_a_browser_and_two_clients_one_of_them_stalled_cost_a_scan_no_time(
         pytest.skip(missing())
     protocol = small_demo(tmp_path, TWO_MODELS)
     protocol.write_text(protocol.read_text().replace("num: 9", "num: 33"))
-    pairs = [time_a_pair_s(tmp_path / f"{n}", protocol, with_browser=True) for n in range(5)]
+    pairs = [
+        time_a_pair_s(tmp_path / f"{n}", protocol, EMULATED_RIG, with_browser=True)
+        for n in range(5)
+    ]
     alone_s, watched_s = np.median(pairs, axis=0)
     record_property("time of a point alone, in s", float(alone_s))
     record_property("watched / alone", float(watched_s / alone_s))

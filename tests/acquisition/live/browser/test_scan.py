@@ -15,8 +15,8 @@ from instrument.record.record import Record
 from tests.support.command import gonio
 from tests.support.live.chromium import Windows, missing
 from tests.support.live.live_scan import live_command
-from tests.support.paths import CONFIGS
 from tests.support.scans import TWO_MODELS, small_demo
+from tests.support.whole_scans.emulated_rig import quick_emulated_rig
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -36,11 +36,9 @@ pytestmark = [
 
 @pytest.fixture
 def rig(tmp_path: Path) -> Path:
-    """The emulated rig, which moves in real time, with short homing and long settling."""
+    """The emulated rig, in real time, that settles so long that a busy browser can keep up."""
     path = tmp_path / "rig.yaml"
-    text = (CONFIGS / "rigs" / "emulated.yaml").read_text()
-    text = text.replace("homing_s: 2.0", "homing_s: 0.2")
-    path.write_text(text.replace("settle_s: 0.0", "settle_s: 0.1"))
+    path.write_text(quick_emulated_rig().replace("settle_s: 0.0", "settle_s: 0.6"))
     return path
 
 
