@@ -30,14 +30,9 @@ class Knowledge:
     def of(
         cls, readings: Sequence[Reading], checks: Sequence[Check], loaded: Loaded, aims: Aims
     ) -> Knowledge:
-        """Fit the candidates quickly: models are not averaged over lamp and lens.
-
-        Checks at resumes count only where the lamp had jumped: else an interruption would change
-        the choices that follow it.
-        """
-        jumps = checks if any(check.jumped for check in checks) else ()
+        """Fit the candidates quickly: models are not averaged over lamp and lens."""
         try:
-            m = measurements(reduced_rows(Rows(readings, jumps, ()), loaded), loaded)
+            m = measurements(reduced_rows(Rows(readings, counted(checks), ()), loaded), loaded)
             choice = choose(m, None, aims.models, method=aims.method)
         except (GonioError, ValueError):
             return cls()  # too few, or all flagged: there is nothing to go by yet
@@ -62,6 +57,14 @@ class Knowledge:
         return {name: None if best is None else best.u.get(name) for name in aims.u}
 
 
+def counted(checks: Sequence[Check]) -> Sequence[Check]:
+    """Return the checks at resumes where the lamp had jumped at one, else none.
+
+    Otherwise an interruption would change the choices that follow it.
+    """
+    return checks if any(check.jumped for check in checks) else ()
+
+
 def agreeing(batch: Batch, model: str, verdict: str) -> bool:
     """Return True if the fit that a batch was based on chose the same physics, the same verdict."""
     return (physics(batch.model), batch.verdict) == (physics(model), verdict)
@@ -78,6 +81,7 @@ def corrections(batches: Sequence[Batch]) -> dict[str, float]:
 
 def full_fit(rows: Rows, loaded: Loaded, aims: Aims) -> tuple[str, Mapping[str, float | None]]:
     """Return the model that the run's own fit chooses, and the u that it will state."""
+    rows = rows._replace(checks=counted(rows.checks))
     fitted = fit_run(reduced_rows(rows, loaded), loaded)
     chosen = fitted.chosen
     if chosen is None:

@@ -2,39 +2,29 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from acquisition.adaptive.candidate_list import candidate_list, with_goal
 from acquisition.adaptive.chooser import Chooser
 from acquisition.adaptive.course import chooser_of, chosen_while_measured
 from acquisition.plan.plan import make_plan
 from acquisition.results.run_folder import run_meta
-from instrument.config.load import Loaded
-from instrument.config.protocol import FitConfig
 from instrument.record.reading import Batch, Reading, batches_of
 from instrument.record.record import Record
-from tests.support.scans import changed, shortest_scan, undated
+from tests.support.adaptive.short_list import short_list
+from tests.support.scans import undated
+from tests.support.storage.killer_process import run_scan_killer
 from tests.support.whole_scans.stopped_scan import scan
 
-VIEWS = [-70.0, -45.0, -20.0, 20.0, 45.0, 70.0]
-
 
 @pytest.fixture(scope="module")
-def listed() -> Loaded:
-    """A matt sample at two incidences: 22 candidates, drift checks after each two."""
-    loaded = shortest_scan()
-    (sweep,) = loaded.protocol.sweeps
-    fit = FitConfig(models=["lambert", "minnaert"])
-    wide = changed(loaded, sweeps=[{**sweep, "theta_r_deg": VIEWS}], fit=fit)
-    return candidate_list(with_goal(wide, "albedo=0.02", None))
-
-
-@pytest.fixture(scope="module")
-def chooser(listed: Loaded) -> Chooser:
-    return chooser_of(listed, make_plan(listed))
+def chooser() -> Chooser:
+    loaded = short_list()
+    return chooser_of(loaded, make_plan(loaded))
 
 
 def _scan(chooser: Chooser, record: Record, upto: int | None = None) -> None:
@@ -83,3 +73,17 @@ def test_a_complete_scan_measures_nothing_more(chooser: Chooser, tmp_path: Path)
         assert not plan.growing
         assert plan.more() == ()
         assert len(plan.known) == before
+
+
+@pytest.mark.slow
+def test_killed_at_random_moments_a_scan_goes_on_with_the_same_choices_and_readings(
+    tmp_path: Path, slow: bool, record_testsuite_property: Callable[[str, object], None]
+) -> None:
+    """With SIGKILL, while it measures and while it chooses."""
+    kills, killer = 300 if slow else 5, "tests.support.adaptive.adaptive_killer"
+    outcome = json.loads(run_scan_killer([tmp_path, kills, 21], {}, 1800, killer))
+    record_testsuite_property("kills of adaptive scans", outcome)
+    assert outcome["kills"] >= kills
+    assert outcome["accepted_before"] > kills  # scans were under way
+    counted = {"kills", "killed_twice", "accepted_before"}
+    assert not any(value for name, value in outcome.items() if name not in counted), outcome

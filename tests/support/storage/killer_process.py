@@ -1,4 +1,4 @@
-"""Start of `scan_killer` in a process of its own."""
+"""Start of `scan_killer`, or of another killer, in a process of its own."""
 
 from __future__ import annotations
 
@@ -9,10 +9,15 @@ import sys
 from tests.support.paths import ROOT
 
 
-def run_scan_killer(arguments: list[object], environment: dict[str, str], timeout_s: float) -> str:
-    """Run the killer with extra environment variables and return its output."""
+def run_scan_killer(
+    arguments: list[object],
+    environment: dict[str, str],
+    timeout_s: float,
+    module: str = "tests.support.storage.scan_killer",
+) -> str:
+    """Run the killer of a module with extra environment variables and return its output."""
     done = subprocess.run(
-        [sys.executable, "-m", "tests.support.storage.scan_killer", *map(str, arguments)],
+        [sys.executable, "-m", module, *map(str, arguments)],
         env={**os.environ, **environment}, cwd=ROOT,
         capture_output=True, text=True, timeout=timeout_s, check=False,
     )  # fmt: skip

@@ -14,21 +14,24 @@ import os
 import random
 import shutil
 import signal
+import statistics
 import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from io import FileIO
+from itertools import pairwise
 from pathlib import Path
 
 from acquisition.engine.engine import Engine
 from acquisition.engine.resume import Progress
-from acquisition.plan.plan import Plan, Step, make_plan
+from acquisition.plan.plan import Plan, make_plan
 from acquisition.results.reduction import reduce
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded
 from instrument.errors import InputError
+from instrument.record.reading import Reading
 from instrument.record.record import Record
 from tests.support.scans import changed, shortest_scan, small_scan, undated
 
@@ -45,21 +48,24 @@ class Outcome:
     not_the_plan_s: int = 0
     unequal: int = 0
     results_unequal: int = 0
+    choices_unequal: int = 0
     jumped: int = 0
 
 
 def scan(folder: Path, loaded: Loaded, plan: Plan, told: Callable[[int], None]) -> None:
     """Start or resume the scan in that folder; `told` is called with each accepted step."""
-
-    def on_step(step: Step) -> None:
-        told(step.index)
-
     with opened(folder) as record, record.claimed():
-        before = Progress.of(record)
-        if not before.missing(plan):
-            return
-        engine = Engine(loaded.protocol, loaded.rig, open_devices(loaded), record, on_step)
-        engine.run(plan, before if before.readings else None)
+        scan_claimed(record, loaded, plan, told)
+
+
+def scan_claimed(record: Record, loaded: Loaded, plan: Plan, told: Callable[[int], None]) -> None:
+    """Start or resume the scan of an open record."""
+    before = Progress.of(record)
+    if not plan.growing and not before.missing(plan):
+        return
+    devices = open_devices(loaded)
+    engine = Engine(loaded.protocol, loaded.rig, devices, record, lambda step: told(step.index))
+    engine.run(plan, before if before.readings else None)
 
 
 def opened(folder: Path) -> Record:
@@ -77,15 +83,25 @@ def opened(folder: Path) -> Record:
 class Killer:
     """Scans in forked processes that are killed."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, loaded: Loaded) -> None:
         self._folder = folder
-        self._loaded = shortest_scan()
-        self._plan = make_plan(self._loaded)
-        scan(folder / "whole", self._loaded, self._plan, lambda _: None)  # fills the caches
+        self._loaded = loaded
+        at_s = list[float]()
+        self.scan(folder / "whole", lambda _: at_s.append(time.monotonic()))  # fills the caches
+        self.usual_step_s = statistics.median(b - a for a, b in pairwise(at_s))
         with Record.open(folder / "whole") as record:
-            self._whole = undated(record.readings())
+            self._whole = measured(record)
             self._brdf = self._reduced(record)
         self.outcome = Outcome()
+
+    @property
+    def steps(self) -> int:
+        """Steps of a whole scan."""
+        return len(self._whole)
+
+    def scan(self, run: Path, told: Callable[[int], None] = lambda _: None) -> None:
+        """Start or resume the scan in a folder; `told` is called with each accepted step."""
+        scan(run, self._loaded, make_plan(self._loaded), told)
 
     def _reduced(self, record: Record) -> list[float]:
         reduced = reduce(record.readings(), self._loaded.protocol, record.checks())
@@ -108,7 +124,7 @@ class Killer:
             recorder.recorder_begin(b"/dev/null")
             recorder.recorder_kill_at(at)
         try:
-            scan(run, self._loaded, self._plan, lambda step: os.write(told, bytes([step])) and None)
+            self.scan(run, lambda step: os.write(told, bytes([step])) and None)
         finally:
             os._exit(0)
 
@@ -117,21 +133,30 @@ class Killer:
         self.outcome.kills += 1
         self.outcome.accepted_before += len(accepted)
         with opened(run) as record:
-            found = undated(record.readings())
+            found = measured(record)
         steps = [r.step for r in found]
         self.outcome.lost += len(accepted - set(steps))
         self.outcome.duplicated += len(steps) - len(set(steps))
-        self.outcome.not_the_plan_s += steps != [s.index for s in self._plan.steps[: len(steps)]]
+        self.outcome.not_the_plan_s += steps != [r.step for r in self._whole[: len(steps)]]
         self.outcome.unequal += found != self._whole[: len(found)]
+
+    def _compare_whole(self, record: Record) -> None:
+        """Count what else differs in the record of a whole scan."""
 
     def finish(self, run: Path) -> None:
         """Resume to the end; count results that differ from those of the scan without kills."""
-        scan(run, self._loaded, self._plan, lambda _: None)
+        self.scan(run)
         with Record.open(run) as record:
-            self.outcome.results_unequal += undated(record.readings()) != self._whole
+            self.outcome.results_unequal += measured(record) != self._whole
             self.outcome.results_unequal += self._reduced(record) != self._brdf
+            self._compare_whole(record)
             self.outcome.jumped += sum(check.jumped for check in record.checks())
         shutil.rmtree(run)
+
+
+def measured(record: Record) -> list[Reading]:
+    """Readings of a record in the order in which they were measured, without their dates."""
+    return undated(sorted(record.readings(), key=lambda reading: reading.time_s))
 
 
 def _after(steps: int, seconds: float) -> Callable[[int, FileIO], bytes]:
@@ -152,20 +177,16 @@ def _after(steps: int, seconds: float) -> Callable[[int, FileIO], bytes]:
 def at_random(killer: Killer, folder: Path, kills: int, seed: int) -> None:
     """Kill at random moments; some scans are killed again after they resume."""
     draw, run = random.Random(seed), folder / "run"
-    begun_s = time.monotonic()
-    scan(folder / "timed", killer._loaded, killer._plan, lambda _: None)
-    steps = len(killer._plan.steps)
-    of_a_step_s = (time.monotonic() - begun_s) / steps
 
     def moment(left: int) -> Callable[[int, FileIO], bytes]:
-        return _after(draw.randint(0, left), draw.uniform(0, 2 * of_a_step_s))
+        return _after(draw.randint(0, left), draw.uniform(0, 2 * killer.usual_step_s))
 
     while killer.outcome.kills < kills:
-        accepted = killer.killed(run, moment(steps))
+        accepted = killer.killed(run, moment(killer.steps))
         killer.look(run, accepted)
         while draw.random() < 0.3 and killer.outcome.kills < kills:
             killer.outcome.killed_twice += 1
-            accepted |= killer.killed(run, moment(steps - len(accepted)))
+            accepted |= killer.killed(run, moment(killer.steps - len(accepted)))
             killer.look(run, accepted)
         killer.finish(run)
 
@@ -206,7 +227,7 @@ def main() -> None:
     if sys.argv[2] == "record":
         recorded(folder, Path(sys.argv[3]))
         return
-    killer = Killer(folder)
+    killer = Killer(folder, shortest_scan())
     if sys.argv[2] == "entries":
         at_entries(killer, folder, int(sys.argv[3]))
     else:
