@@ -16,10 +16,10 @@ import numpy as np
 from acquisition.adaptive.aims import Aims
 from acquisition.adaptive.knowledge import Knowledge, agreeing, corrections
 from acquisition.adaptive.layout import Layout
-from acquisition.adaptive.next_points import MOST, Costs, NextPoints, noise_parts
+from acquisition.adaptive.next_points import Costs, NextPoints
 from acquisition.design.assumed_sample import AssumedSample
-from acquisition.design.forecast import forecast
-from acquisition.plan.plan import Plan, Step
+from acquisition.design.forecast import Forecaster
+from acquisition.plan.plan import Step
 from acquisition.plan.recorded_choice import steps_of
 from analysis.design.optimal import LACK_OF_FIT
 from analysis.design.space_filling import farthest_from
@@ -105,6 +105,10 @@ class Chooser:
         """Mask (N,), without a unit, of the candidates to which a way leads, and back."""
         return np.array([self.layout.reachable(step) for step in self.points])
 
+    @cached_property
+    def _forecaster(self) -> Forecaster:
+        return Forecaster(self.layout.loaded, self.layout.plan)
+
     def _current(self, known: Sequence[Step]) -> BoolArray:
         """Candidates (N,) at the present setting of the lamp by hand."""
         block = known[-1].block if known else self.layout.blocks()[0]
@@ -161,24 +165,16 @@ class Chooser:
         counts: tuple[int, int],
         factors: Mapping[str, float],
     ) -> Proposal:
-        leading, layout = known.leading, self.layout
+        leading = known.leading
         if leading is None:
             raise ValueError("no model to forecast with")
         model = MODELS[leading.model]
         x = np.array([leading.values[p.name] for p in model.parameters])
         sample = AssumedSample(model, x, "the fit so far")
-        every = forecast(layout.loaded, layout.plan, sample)
-        longest = forecast(layout.loaded, _with_frames(layout.plan, MOST), sample)
+        every = self._forecaster.of(sample)
         used = every.used
-        costs = self._costs(steps, used)
-        choice = NextPoints(
-            every,
-            noise_parts(every, longest),
-            costs,
-            self._multiples(steps)[used],
-            known,
-            self.aims,
-        )
+        costs, multiples = self._costs(steps, used), self._multiples(steps)[used]
+        choice = NextPoints(every, costs, multiples, known, self.aims)
         by_design = choice.u_measured(measured[used])
         fitted = {name: leading.u.get(name) for name in self.aims.u}
         # Errors that the fit sees beside those of the forecast stay in their ratio.
@@ -265,12 +261,6 @@ class Chooser:
         """Time of a degree that the camera turns, in s; none for one that is set by hand."""
         axis = self.layout.rig.axes.theta_r
         return 0.0 if isinstance(axis, HandAxis) else 1 / axis.speed_deg_per_s
-
-
-def _with_frames(plan: Plan, times: int) -> Plan:
-    """Return the plan with so many times the frames at every step."""
-    steps = (replace(step, frames=times * step.frames) for step in plan.steps)
-    return replace(plan, steps=tuple(steps))
 
 
 def _camera_s(step: Step) -> float:

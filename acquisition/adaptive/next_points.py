@@ -20,6 +20,7 @@ from acquisition.design.forecast import Forecast
 from analysis.choice.ladder import physics
 from analysis.design.information import Information
 from analysis.design.optimal import LACK_OF_FIT, RIVALS, SHARE
+from analysis.design.posterior import Posterior
 from analysis.design.rivals import MOST as MOST_RIVALS
 from analysis.design.rivals import Rival
 from analysis.design.space_filling import farthest_from
@@ -82,39 +83,24 @@ class Costs:
         return np.asarray(point_s + way_s[self.setting] + self.per_deg_s * outside_deg)
 
 
-def noise_parts(every: Forecast, longest: Forecast) -> FloatArray:
-    """Return the part (N,) of each candidate's independent variance that frames average, 0 to 1.
-
-    every, longest: forecasts of the same points with the protocol's frames, and with `MOST` times.
-    """
-    one, most = (np.square(f.problem.covariance.u_independent) for f in (every, longest))
-    return np.clip((1 - most / one) * MOST / (MOST - 1), 0.0, 1.0)
-
-
 class NextPoints:
     """Choice among the N candidates of a forecast for the leading model, given those chosen.
 
-    noise: (N,), part of the variance that frames average. multiples: (N,), frames of those chosen
-    in units of the protocol's, as a ratio, 0 of the others.
+    multiples: (N,), frames of those chosen in units of the protocol's, as a ratio, 0 of the others.
     """
 
     def __init__(
-        self,
-        every: Forecast,
-        noise: FloatArray,
-        costs: Costs,
-        multiples: IntArray,
-        known: Knowledge,
-        aims: Aims,
+        self, every: Forecast, costs: Costs, multiples: IntArray, known: Knowledge, aims: Aims
     ) -> None:
         self.every, self._costs, self._aims = every, costs, aims
-        self._noise, self._multiples = noise, multiples
+        self._noise, self._multiples = every.averaged, multiples
         self._information = every.information
         self._weights = self._information.weights(aims.u, aims.u)
         self._chosen = multiples > 0
         self._once = self._information.rows
         own = self._by_frames(1)
         self._known = own.matrix(self._chosen.astype(np.float64))
+        self._posterior = Posterior(own, self._weights, self._chosen)
         self._rivals = list(_rivals(known, every))
         self.asked = [n for n in self._information.names if n in aims.u]
 
@@ -184,21 +170,27 @@ class NextPoints:
         """
         if self._criterion(times) > target:
             return times
-        kept, columns = times.copy(), np.flatnonzero(self._weights)
+        kept = times.copy()
         while np.count_nonzero(kept) > 1:
-            more = self._information_of(kept)
-            inverse = np.linalg.inv(self._known + self._added(more))
             own = np.flatnonzero(kept)
-            rows = self._once[own] * np.sqrt(more[own])[:, np.newaxis]
-            seen = rows @ inverse
-            rest = np.maximum(1 - np.sum(seen * rows, axis=1), 1e-9)
-            lost = (np.square(seen[:, columns]) @ self._weights[columns]) / rest
-            now = float(np.diag(inverse)[columns] @ self._weights[columns])
+            cross, inverse = self._posterior.cross[own], self._inverse(kept)
+            seen = inverse @ cross
+            now = float(self._posterior.criterion - np.sum(cross * seen))
+            lost = np.square(seen).sum(axis=1) / np.maximum(np.diag(inverse), 1e-9)
             least = int(np.argmin(lost / self._costs.alone_s(kept)[own]))
             if now + lost[least] > target:
                 break
             kept[own[least]] = 0
         return kept
+
+    def _inverse(self, times: IntArray) -> FloatArray:
+        """Inverse covariance (M, M) of the readings of M further points, with frames (N,).
+
+        In units of their independent u, and before they are measured (Woodbury).
+        """
+        own = np.flatnonzero(times)
+        noise = np.diag(1 / self._information_of(times)[own])
+        return np.asarray(np.linalg.inv(self._posterior.predicted[np.ix_(own, own)] + noise))
 
     def _information_of(self, times: IntArray) -> FloatArray:
         """Weights (N,) of further points in the information, as a ratio: what frames average."""
@@ -222,27 +214,25 @@ class NextPoints:
         found[used] = own
         return found
 
-    def _added(self, weights: FloatArray) -> FloatArray:
-        """Information (unknowns, unknowns) of further points, with weights (N,) as a ratio."""
-        return np.asarray((self._once * weights[:, np.newaxis]).T @ self._once)
-
     def _parts(self, times: IntArray) -> dict[str, float]:
         """Return the u of each parameter in units of that wanted, with further frames (N,)."""
-        inverse = np.linalg.inv(self._known + self._added(self._information_of(times)))
-        variance = np.diag(inverse)
-        names = self._information.names
-        return {n: float(np.sqrt(variance[k] * self._weights[k])) for k, n in enumerate(names)
-                if n in self.asked}  # fmt: skip
+        cross = self._posterior.cross[np.flatnonzero(times)]
+        variance = self._posterior.variance - np.sum(cross * (self._inverse(times) @ cross), axis=0)
+        return dict(zip(self.asked, np.sqrt(variance).tolist(), strict=True))
 
     def _criterion(self, times: IntArray) -> float:
         return sum(part**2 for part in self._parts(times).values())
 
     def _reasons(self, times: IntArray) -> dict[int, str]:
         """Return the parameter that each further point is for: whose variance it lowers most."""
-        inverse = np.linalg.inv(self._known + self._added((times > 0).astype(np.float64)))
-        columns = [self._information.names.index(name) for name in self.asked]
-        part = np.square(self._once @ inverse[:, columns]) / np.diag(inverse)[columns]
-        return {int(k): self.asked[int(np.argmax(part[k]))] for k in np.flatnonzero(times)}
+        once = (times > 0).astype(np.int64)
+        own = np.flatnonzero(once)
+        part = np.square(self._inverse(once) @ self._posterior.cross[own])
+        variance = np.square([*self._parts(once).values()])
+        return {
+            int(k): self.asked[int(np.argmax(row))]
+            for k, row in zip(own, part / variance, strict=True)
+        }
 
     def _spread(self, reasons: dict[int, str], spread: int, allowed: BoolArray) -> None:
         """Add points for lack of fit, until they are a fifth of all: the farthest from others."""
@@ -268,8 +258,9 @@ class NextPoints:
             return None
         seconds = self._costs.one_more_s(batch)
         for rival in self._rivals:
-            if rival.missed(self._chosen) < _TOLD:
-                worth = np.where(free, rival.differences(self._chosen) / seconds, -1.0)
+            best = rival.best(self._chosen)
+            if best.chi2 < _TOLD:
+                worth = np.where(free, rival.differences(self._chosen, best) / seconds, -1.0)
                 return int(np.argmax(worth))
         return None
 

@@ -7,6 +7,7 @@ shared as it is. The rig's finite lamp, lens and patch are left out: they change
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from acquisition.design.assumed_sample import AssumedSample
 from acquisition.design.predicted_readings import PredictedReadings
 from acquisition.plan.plan import Plan
 from acquisition.results.fitting import measurements
-from acquisition.results.reduction import reduced_rows
+from acquisition.results.reduction import NOISE, reduced_rows
 from analysis.data.covariance import ANGLES, LAMP_LEVEL
 from analysis.data.measurements import Measurements
 from analysis.design.information import Information, assumed_problem
@@ -32,23 +33,29 @@ UNDETERMINED = 0.25
 """Part of a parameter's domain; a u beyond it says nothing."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Forecast:
     """Planned points (N,) as a fit will take them, for an assumed sample.
 
-    used: mask over the plan's points of those that the fit will use. problem: the assumed model's,
-    at x (K,), its parameters.
+    used: mask over the plan's points of those that the fit will use. averaged: (N,), part of each
+    one's independent variance that frames average, 0 to 1. problem: the assumed model's, at x (K,),
+    its parameters.
     """
 
     used: BoolArray
+    averaged: FloatArray
     measurements: Measurements
     problem: Problem
     x: FloatArray
 
-    @property
+    @cached_property
     def information(self) -> Information:
         """Information of the points about the parameters."""
         return Information.of(self.problem, self.x)
+
+    @cached_property
+    def _shared_parts(self) -> FloatArray:
+        return self.information.shared_parts(np.ones(self.measurements.size))
 
     def u(self) -> dict[str, float]:
         """Standard uncertainty of each parameter, in its unit, by all points measured once.
@@ -63,8 +70,8 @@ class Forecast:
     def sources(self, parameter: str) -> dict[str, float]:
         """Parts of a parameter's variance by the source of error, of a sum of 1, largest first."""
         m, information = self.measurements, self.information
-        independent, shared = information.parts(np.ones(m.size), parameter)
-        found = {INDEPENDENT: independent}
+        shared = self._shared_parts[information.names.index(parameter)]
+        found = {INDEPENDENT: float(1 - shared.sum())}
         named = sorted({error.name for error in m.shared}, key=len, reverse=True)
         for numbered, part in zip(information.errors, shared.tolist(), strict=True):
             source = next((name for name in named if numbered.startswith(name)), None)
@@ -73,25 +80,44 @@ class Forecast:
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
+class Forecaster:
+    """Forecasts of one plan for any samples."""
+
+    def __init__(self, loaded: Loaded, plan: Plan) -> None:
+        self._loaded = _without_patch(loaded)
+        self._readings = PredictedReadings(self._loaded, plan)
+
+    def of(self, sample: AssumedSample) -> Forecast:
+        """Forecast the plan for a sample. Raises `InputError` if no point can be used."""
+        values = dict(
+            zip((p.name for p in sample.model.parameters), sample.x.tolist(), strict=True)
+        )
+
+        def brdf(geometry: Geometry) -> FloatArray:
+            return sample.model.brdf(geometry, **values)
+
+        reduced = reduced_rows(Rows(self._readings.of(brdf), (), ()), self._loaded)
+        if not np.any(reduced.valid):
+            flags = ", ".join(sorted({flag for flag in reduced.flags if flag}))
+            raise InputError(
+                f"{self._loaded.protocol_path}: none of its geometries can be used for a sample "
+                f"like {sample.text}: {flags}"
+            )
+        m = measurements(reduced, self._loaded)
+        problem, x = assumed_problem(sample.model, sample.x, m)
+        noise = reduced.components[NOISE][reduced.valid] * problem.brdf
+        return Forecast(
+            used=reduced.valid,
+            averaged=np.square(noise / problem.covariance.u_independent),
+            measurements=m,
+            problem=problem,
+            x=x,
+        )
+
+
 def forecast(loaded: Loaded, plan: Plan, sample: AssumedSample) -> Forecast:
     """Forecast a plan for a sample. Raises `InputError` if none of its points can be used."""
-    loaded = _without_patch(loaded)
-    values = dict(zip((p.name for p in sample.model.parameters), sample.x.tolist(), strict=True))
-
-    def brdf(geometry: Geometry) -> FloatArray:
-        return sample.model.brdf(geometry, **values)
-
-    readings = PredictedReadings(loaded, brdf).of(plan)
-    reduced = reduced_rows(Rows(readings, (), ()), loaded)
-    if not np.any(reduced.valid):
-        flags = ", ".join(sorted({flag for flag in reduced.flags if flag}))
-        raise InputError(
-            f"{loaded.protocol_path}: none of its geometries can be used for a sample like "
-            f"{sample.text}: {flags}"
-        )
-    m = measurements(reduced, loaded)
-    problem, x = assumed_problem(sample.model, sample.x, m)
-    return Forecast(used=reduced.valid, measurements=m, problem=problem, x=x)
+    return Forecaster(loaded, plan).of(sample)
 
 
 def _without_patch(loaded: Loaded) -> Loaded:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -20,7 +21,7 @@ JUMP_U, MIN_JUMP = 4.0, 0.003  # a jump exceeds both: in u, and relative
 _WARM_UP_STEP, _WARM_UP_PER_S, _WARM_UP = 0.005, 1.0 / 3600.0, 0.02
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Segment:
     """Checks between which the lamp drifts steadily.
 
@@ -45,13 +46,13 @@ class _Segment:
         scatter = scatter_ratio(times_s, level, noise)
         return cls(times_s, level, noise * scatter, scatter)
 
-    @property
+    @cached_property
     def u_wander(self) -> float:
         """Standard uncertainty of a level by what the checks scatter beyond noise, relative."""
         wander = float(np.median(self.u_relative)) * math.sqrt(1 - self.scatter**-2)
         return wander if self.scatter > 1 else 0.0
 
-    @property
+    @cached_property
     def trend_per_s(self) -> float:
         """Mean change of the level over all checks."""
         if self.times_s.size < 2:
@@ -60,7 +61,8 @@ class _Segment:
 
     def outside_s(self, time_s: float) -> float:
         """Return the signed time to the nearest check, 0 between the first and the last."""
-        return float(time_s - np.clip(time_s, self.times_s[0], self.times_s[-1]))
+        first_s, last_s = float(self.times_s[0]), float(self.times_s[-1])
+        return float(time_s - min(max(time_s, first_s), last_s))
 
     def at(self, time_s: float) -> float:
         """Return the level: linear between the checks, extrapolated by the mean trend."""
@@ -225,8 +227,8 @@ class Drift:
 
     def _segment(self, time_s: float) -> _Segment | None:
         """Return the last segment that began before that time, or else the first."""
-        begun = [s for s in self.segments[1:] if s.times_s[0] < time_s]
-        return (*self.segments[:1], *begun)[-1] if self.segments else None
+        begun = (s for s in reversed(self.segments[1:]) if s.times_s[0] < time_s)
+        return next(begun, self.segments[0] if self.segments else None)
 
 
 def u_unknown_trend(apart_s: float) -> float:

@@ -9,6 +9,7 @@ level and the noise, and so the error.
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -20,6 +21,8 @@ from instrument.geometry import FloatArray
 _VARIANCES = np.geomspace(0.05**2, 0.9**2, 60)
 _LEVELS = np.linspace(-1.0, 1.0, 801)  # in DN
 _TERMS = np.arange(1, 21)
+_MOST_TERMS = 1999
+_UNDERFLOW = math.sqrt(745.2) / (2 * math.pi)  # exp(-745.2) is 0 in double precision
 _FAR_DN = 1.5  # from the median: a defective pixel, which says nothing about the noise of others
 _ENOUGH = 1000  # pixels for that median: it is off by a hundredth of a count
 
@@ -31,7 +34,10 @@ def rounding_u_dn(noise_variance_dn2: float) -> float:
     k-th term of the sawtooth error's Fourier series by exp(-2 pi^2 k^2 s^2). Averaged over all
     levels.
     """
-    k = np.arange(1, 2000)
+    terms = _MOST_TERMS
+    if noise_variance_dn2 > 0:  # the exponentials of more are 0
+        terms = min(terms, math.ceil(_UNDERFLOW / math.sqrt(noise_variance_dn2)))
+    k = np.arange(1, terms + 1)
     damped = np.exp(-4 * np.pi**2 * k**2 * noise_variance_dn2) / (2 * np.pi**2 * k**2)
     return float(np.sqrt(damped.sum()))
 

@@ -8,9 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
 from instrument.config.camera import CameraConfig
 from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
+from instrument.geometry import FloatArray
 
 LADDER_RATIO = math.sqrt(2.0)
 
@@ -39,6 +42,13 @@ def longest_exposure_s(
     ladder, taken = exposure_ladder_s(camera), taken_s or {}
     allowed = [rung for rung in ladder if taken.get(rung, rung) <= limit_s * (1 + 1e-9)]
     return max(allowed, key=lambda rung: taken.get(rung, rung), default=ladder[0])
+
+
+def longest_exposures_s(limits_s: FloatArray, camera: CameraConfig) -> FloatArray:
+    """Return the rung for each of the limits (N,), in seconds, as `longest_exposure_s` does."""
+    ladder = np.sort(exposure_ladder_s(camera))
+    places = np.searchsorted(ladder, limits_s * (1 + 1e-9), side="right") - 1
+    return np.asarray(ladder[np.maximum(places, 0)])
 
 
 def expected_exposure_s(

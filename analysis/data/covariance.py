@@ -149,7 +149,9 @@ def has_shared_errors(m: Measurements) -> bool:
     return bool(m.shared) or m.free_levels or any(angles)
 
 
-def full_covariance(measurements: Measurements, brdf: Brdf) -> Covariance:
+def full_covariance(
+    measurements: Measurements, brdf: Brdf, *, repeatable: bool = False
+) -> Covariance:
     """Covariance of all stated uncertainties, linearised about a model near the data.
 
     `brdf` returns the model's BRDF in 1/sr, of the geometry's shape. It converts the errors of the
@@ -161,7 +163,8 @@ def full_covariance(measurements: Measurements, brdf: Brdf) -> Covariance:
     which differs from point to point, counts with no more than a few times the slope of the data
     themselves (`_view_limit`). And comparisons of models add `log_determinant`: chi2 + ln det C is
     -2 ln of the likelihood, in which a covariance that is too large costs more than it saves.
-    Raises `ValueError` where `u_random` is not stated.
+    `repeatable`: the points may be repeated, so that an error that one of them alone has is shared
+    as well. Raises `ValueError` where `u_random` is not stated.
     """
     m = measurements
     if m.u_random is None:
@@ -173,7 +176,7 @@ def full_covariance(measurements: Measurements, brdf: Brdf) -> Covariance:
     shifts: list[FloatArray] = []
     names: list[str] = []
     for name, shift, group in groups:
-        single, row, column, labels = _columns(shift, group)
+        single, row, column, labels = _columns(shift, group, 1 if repeatable else 2)
         variance = variance + np.square(single)
         rows.append(row)
         columns.append(len(names) + column)
@@ -240,15 +243,15 @@ def _matrix(
 
 
 def _columns(
-    shift: FloatArray, group: IntArray | FloatArray
+    shift: FloatArray, group: IntArray | FloatArray, least: int
 ) -> tuple[FloatArray, IntArray, IntArray, list[str]]:
-    """Shifts (N,) of points alone in their group; rows, columns and labels of the larger groups.
+    """Shifts (N,) of points in smaller groups; rows, columns and labels of those of `least` points.
 
     The points of a group have the same number in `group`, or the same angle in degrees.
     """
     values, member, count = np.unique(group, return_inverse=True, return_counts=True)
-    single = count[member] == 1
-    several = np.flatnonzero((count > 1) & (np.bincount(member, np.abs(shift)) > 0))
+    single = count[member] < least
+    several = np.flatnonzero((count >= least) & (np.bincount(member, np.abs(shift)) > 0))
     column = np.full(values.size, -1)
     column[several] = np.arange(several.size)
     rows = np.flatnonzero(column[member] >= 0)

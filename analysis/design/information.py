@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.data.covariance import Covariance, full_covariance
-from analysis.data.measurements import Measurements, SharedError
+from analysis.data.covariance import full_covariance
+from analysis.data.measurements import Measurements
 from analysis.fit.relative_scale import FACTOR_NAME, relative_model
 from analysis.fit.search.problem import Problem
 from analysis.models import Model
-from instrument.geometry import Brdf, FloatArray, Geometry, IntArray
+from instrument.geometry import FloatArray, Geometry
 
 # Prior u of a parameter in units of its domain: says next to nothing, and every matrix is regular.
 _PRIOR_U = 10.0
@@ -69,7 +69,13 @@ class Information:
 
         Counts need not be whole numbers.
         """
-        return np.diag(self.prior) + (self.rows * counts[:, np.newaxis]).T @ self.rows
+        rows = self._measured(counts)
+        return np.diag(self.prior) + rows.T @ rows
+
+    def _measured(self, counts: FloatArray) -> FloatArray:
+        """Rows (M, K + S) of the M candidates that a design measures, by the root of `counts`."""
+        own = counts > 0
+        return np.asarray(self.rows[own] * np.sqrt(counts[own])[:, np.newaxis])
 
     def root(self, counts: FloatArray) -> FloatArray:
         """Root (unknowns, unknowns) of the unknowns' covariance, by a design of `counts` (N,).
@@ -78,7 +84,7 @@ class Information:
         is found from the rows, whose condition is milder, so that rows times it are exact where
         the design leaves another unknown undetermined.
         """
-        rows = self.rows * np.sqrt(counts)[:, np.newaxis]
+        rows = self._measured(counts)
         R = np.linalg.qr(np.vstack([rows, np.diag(np.sqrt(self.prior))]), mode="r")
         return np.asarray(np.linalg.inv(R))
 
@@ -87,23 +93,38 @@ class Information:
         root = self.root(counts)
         return np.asarray(root @ root.T)
 
+    def _of_parameters(self, counts: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Covariance (K, K) of the parameters, and with the shared errors, (K, S), negative.
+
+        By generalised least squares for a design of `counts` (N,): rows are whitened by the
+        covariance 1 + B B^T that the shared errors B give them, which is quicker than `root` and
+        as exact for the parameters.
+        """
+        K, rows = len(self.names), self._measured(counts)
+        B = rows[:, K:]
+        L = np.linalg.cholesky(np.eye(len(rows)) + B @ B.T)
+        white = np.linalg.solve(L, rows)
+        prior = np.diag(np.sqrt(self.prior[:K]))
+        inverse = np.linalg.inv(np.linalg.qr(np.vstack([white[:, :K], prior]), mode="r"))
+        own = inverse @ inverse.T
+        return own, own @ white[:, :K].T @ white[:, K:]
+
     def u(self, counts: FloatArray) -> dict[str, float]:
         """Standard uncertainty of each parameter, in its unit, by a design of `counts` (N,).
 
         Of a parameter that the design does not determine it is larger than the domain.
         """
-        own = np.diag(self.covariance(counts))[: len(self.names)]
+        own = np.diag(self._of_parameters(counts)[0])
         return dict(zip(self.names, (np.sqrt(own) * self.domain).tolist(), strict=True))
 
-    def parts(self, counts: FloatArray, parameter: str) -> tuple[float, FloatArray]:
-        """Parts of a parameter's variance, of a sum of 1, by a design of `counts` (N,).
+    def shared_parts(self, counts: FloatArray) -> FloatArray:
+        """Parts (K, S) of each parameter's variance by each shared error, at a design (N,).
 
-        That of independent errors, and those (S,) of each shared error: what one u of it shifts the
-        best estimate by, squared.
+        What one u of the error shifts the best estimate by, squared, in units of the variance; what
+        they lack to a sum of 1 is the part of independent errors.
         """
-        covariance, k = self.covariance(counts), self.names.index(parameter)
-        shared = np.square(covariance[k, len(self.names) :]) / covariance[k, k]
-        return float(1 - shared.sum()), shared
+        own, with_errors = self._of_parameters(counts)
+        return np.asarray(np.square(with_errors) / np.diag(own)[:, np.newaxis])
 
     def weights(self, asked: Iterable[str], goal: Mapping[str, float] | None = None) -> FloatArray:
         """Weights (unknowns,) on the variances of the asked parameters, for one sum of all.
@@ -112,11 +133,11 @@ class Information:
         is the most that can be reached by measuring every candidate once. With a `goal`, the u
         wanted of each, in its unit, each counts in units of the variance wanted.
         """
-        own = np.diag(self.covariance(np.ones(len(self.rows))))
         found = np.zeros(self.rows.shape[1])
+        wanted = self.u(np.ones(len(self.rows))) if goal is None else goal
         for name in asked:
             k = self.names.index(name)
-            found[k] = 1 / own[k] if goal is None else (self.domain[k] / goal[name]) ** 2
+            found[k] = (self.domain[k] / wanted[name]) ** 2
         return found
 
 
@@ -135,7 +156,7 @@ def assumed_problem(
         return np.asarray(model.kernel(geometry, **values))
 
     m = _with_values(measurements, brdf(measurements.geometry))
-    covariance = _repeatable_covariance(m, brdf)
+    covariance = full_covariance(m, brdf, repeatable=True)  # in it no repetition averages them
     if not m.relative:
         return Problem(model, m.geometry, m.brdf, covariance), x
     scaled = relative_model(model, m.brdf)
@@ -143,27 +164,6 @@ def assumed_problem(
     least = {p.name: p.low for p in scaled.parameters}
     at = np.array([max(values[p.name], least[p.name]) for p in scaled.parameters])
     return Problem(scaled, m.geometry, m.brdf, covariance), at
-
-
-def _repeatable_covariance(m: Measurements, brdf: Brdf) -> Covariance:
-    """Covariance in which an error that a point alone has is shared by repetitions of that point.
-
-    In that of points measured once it would count as noise, and repetitions would average it.
-    """
-    twice = np.tile(np.arange(m.size), 2)
-    arrays = ("theta_i_deg", "theta_r_deg", "dphi_deg", "brdf", "u_random", "lamp_setting")
-    doubled = replace(
-        m,
-        **{name: getattr(m, name)[twice] for name in arrays},
-        shared=tuple(_taken(error, twice) for error in m.shared),
-    )
-    return full_covariance(doubled, brdf).subset(np.arange(twice.size) < m.size)
-
-
-def _taken(error: SharedError, points: IntArray) -> SharedError:
-    """The same error for the points of these numbers (M,)."""
-    angles = (np.broadcast_to(a, error.group.shape)[points] for a in error.angles_deg)
-    return SharedError(error.name, error.u_relative[points], error.group[points], *angles)
 
 
 def _with_values(m: Measurements, brdf: FloatArray) -> Measurements:

@@ -17,6 +17,7 @@ from analysis.data.measurements import Measurements
 from analysis.design.information import Information
 from analysis.design.space_filling import farthest
 from analysis.fit.first_fit import FirstFits, enough_points
+from analysis.fit.search.levenberg_marquardt import Minimum
 from analysis.fit.search.problem import Problem
 from analysis.models import MODELS
 from analysis.models.special_cases import special_cases
@@ -53,17 +54,22 @@ class Rival:
         found = problem.solve(start)
         return cls(name=problem.model.name, problem=problem, x=found.x, chi2=found.chi2)
 
+    def best(self, design: BoolArray) -> Minimum:
+        """Best fit to a design, a mask (N,), with its parameters in their units."""
+        return self.problem.subset(design).solve(self.x)
+
     def missed(self, design: BoolArray) -> float:
         """chi2, in units of u^2, of the best fit to a design (N,)."""
-        return float(self.problem.subset(design).solve(self.x).chi2)
+        return float(self.best(design).chi2)
 
-    def differences(self, design: BoolArray) -> FloatArray:
+    def differences(self, design: BoolArray, best: Minimum | None = None) -> FloatArray:
         """Amount (N,) by which each further candidate would raise `missed`, to first order.
 
         The squared difference from the best fit to the design, in units of its uncertainty: what
-        a small move of the fit or the shared errors could explain as well does not count.
+        a small move of the fit or the shared errors could explain as well does not count. best:
+        that fit, where it is known.
         """
-        x = self.problem.subset(design).solve(self.x).x
+        x = (self.best(design) if best is None else best).x
         information = Information.of(self.problem, x)
         rows = information.rows
         off = (self.problem.brdf - self.problem.predict(x)) / self.problem.covariance.u_independent

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from acquisition.design.assumed_sample import assumed_sample
@@ -19,7 +20,7 @@ from instrument.config.load import Loaded
 from instrument.config.protocol import References
 from instrument.errors import InputError
 from instrument.record.record import Record
-from tests.support.scans import changed
+from tests.support.scans import changed, exact_rig
 from tests.support.whole_scans.stopped_scan import scan
 
 GLOSSY = "oren_nayar+torrance_sparrow:albedo=0.8,sigma_deg=20,ks=0.076"
@@ -52,6 +53,18 @@ def test_the_texture_of_the_sample_adds_to_u(small: Loaded) -> None:
     ]
     assert u[0]["sigma_deg"] < u[1]["sigma_deg"] < u[2]["sigma_deg"]
     assert _u(changed(small, simulated_sample=None)) == pytest.approx(u[1])  # the usual texture
+
+
+def test_eight_times_the_frames_average_the_part_that_is_said(small: Loaded) -> None:
+    """Where angles are exact; else their second-order part may be bounded by the noise."""
+    placed = {"u_placement_mm": small.rig.u_placement_mm}
+    exact = replace(small, rig=exact_rig(small.rig).model_copy(update=placed))
+    plan, sample = make_plan(exact), assumed_sample(GLOSSY, exact)
+    longer = tuple(replace(step, frames=8 * step.frames) for step in plan.steps)
+    once, often = (forecast(exact, one, sample) for one in (plan, replace(plan, steps=longer)))
+    left = np.square(often.problem.covariance.u_independent / once.problem.covariance.u_independent)
+    assert once.averaged == pytest.approx((1 - left) * 8 / 7, abs=1e-4)
+    assert once.averaged.min() < 0.95 < once.averaged.max()
 
 
 def test_a_better_tile_lowers_the_u_of_the_albedo(small: Loaded) -> None:

@@ -21,7 +21,7 @@ def _predicted(loaded: Loaded) -> list[Reading]:
     def brdf(geometry: Geometry) -> FloatArray:
         return MODELS[sample.model].brdf(geometry, **sample.parameters)
 
-    return PredictedReadings(loaded, brdf).of(make_plan(loaded))
+    return PredictedReadings(loaded, make_plan(loaded)).of(brdf)
 
 
 def test_the_readings_of_a_scan_are_as_predicted(small: Loaded, whole: list[Reading]) -> None:

@@ -83,14 +83,14 @@ def test_the_parts_of_a_variance_are_those_of_the_best_estimate() -> None:
     m = planned(THETA_I, THETA_R, u=0.004, shared=_with_shared_errors(), u_theta_i_deg=0.1)
     problem, x = assumed_problem(GLOSSY, FOAM, m)
     found = Information.of(problem, x)
-    independent, shared = found.parts(np.ones(N), "sigma_deg")
+    shared = found.shared_parts(np.ones(N))[1]
     W = problem.jacobian(x)
     estimate = np.linalg.solve(W.T @ W, W.T)[1]
     common = np.asarray(problem.covariance.common)
     expected = np.square(estimate @ problem.covariance.whiten(common))
     variance = found.u(np.ones(N))["sigma_deg"] ** 2
     assert shared == pytest.approx(expected / variance, rel=1e-3, abs=1e-6)
-    assert independent + shared.sum() == pytest.approx(1)
+    assert 0 < shared.sum() < 1
     assert len(found.errors) == shared.size
 
 
@@ -118,3 +118,17 @@ def test_without_a_reference_the_roughness_is_determined_less_well() -> None:
     u = information(replace(bare, relative=True, free_levels=True)).u(np.ones(N))
     assert set(u) == {"albedo", "sigma_deg", "ks", "per_brdf"}
     assert information(bare).u(np.ones(N))["sigma_deg"] < u["sigma_deg"] < 3
+
+
+def test_a_design_s_u_is_that_of_the_joint_covariance_of_parameters_and_errors() -> None:
+    """Two ways to the same numbers, for random counts, some of them 0."""
+    m = planned(THETA_I, THETA_R, u=0.004, shared=_with_shared_errors(), u_theta_i_deg=0.1)
+    found = Information.of(*assumed_problem(GLOSSY, FOAM, m))
+    random = np.random.default_rng(12)
+    for _ in range(5):
+        counts = random.integers(0, 3, N) * random.uniform(0.5, 2.0, N)
+        C, K = found.covariance(counts), len(found.names)
+        u = np.sqrt(np.diag(C)[:K]) * found.domain
+        assert list(found.u(counts).values()) == pytest.approx(u, rel=1e-6)
+        parts = np.square(C[:K, K:]) / np.diag(C)[:K, np.newaxis]
+        assert found.shared_parts(counts) == pytest.approx(parts, rel=1e-5, abs=1e-9)

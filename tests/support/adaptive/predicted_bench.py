@@ -67,7 +67,7 @@ class PredictedBench:
         self.plan = make_plan(loaded)
         self.chooser = chooser or chooser_of(loaded, self.plan)
         self._model, self._parameters = MODELS[sample[0]], dict(sample[1])
-        self._predicted = PredictedReadings(loaded, self._brdf).of(self.plan)
+        self._predicted = PredictedReadings(loaded, self.plan).of(self._brdf)
 
     def create(self, folder: Path) -> Record:
         """Create the record of a run, as `gonio run` does."""
