@@ -101,6 +101,7 @@ def _charts_where_asked_for(request: pytest.FixtureRequest) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         if not request.node.get_closest_marker("charts"):
             patch.setattr("analysis.report.figure_list.embedded_svg", lambda *_: "<svg></svg>")
+            patch.setattr("analysis.report.page.rendered_html", lambda *_: "")
         yield
 
 

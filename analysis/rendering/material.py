@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from analysis.models import MODELS
 from analysis.models.base import Model, named_terms
+from analysis.models.lambert import LAMBERT
 from analysis.models.rough.oren_nayar_exact import OREN_NAYAR_EXACT
 from analysis.rendering.angles import local_geometry, longitudes
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import Brdf, FloatArray, Geometry
 
 _COSTLY = (OREN_NAYAR_EXACT.name,)  # 20 to 40 us a geometry, where a closed form takes 0.2
 _STEPS = 33  # of longitude and of latitude in the table of a costly term
 _FEW = 2 * _STEPS**2  # normals, up to which a costly term is evaluated at each of them
+_NODES = 96  # of the reflectance at normal incidence
 _EDGE = 1e-4  # of the table: on it lamp or camera would graze, and at the poles both
 
 
@@ -35,6 +38,29 @@ class Material:
     def brdf(self, geometry: Geometry) -> FloatArray:
         """Return the BRDF in 1/sr, of the geometry's shape, as the model computes it."""
         return self.model.brdf(geometry, **self.parameters)
+
+    @property
+    def albedo(self) -> float:
+        """The model's `albedo`; of a model without one, its reflectance at normal incidence."""
+        known = self.parameters.get("albedo")
+        return self._normal_reflectance() if known is None else float(known)
+
+    @property
+    def lambert(self) -> Brdf:
+        """Lambert's BRDF of the same albedo, also above 1, to be called as `Model.brdf` with it."""
+        return partial(LAMBERT.kernel, albedo=self.albedo)
+
+    def _normal_reflectance(self) -> float:
+        """Share of light at normal incidence that is reflected, to any side.
+
+        By Gauss's rule with its nodes close together towards the normal, where a lobe is narrow.
+        """
+        t, weights = np.polynomial.legendre.leggauss(_NODES)
+        t, weights = (t + 1) / 2, weights / 2
+        theta = np.pi / 2 * t**3
+        ring = np.pi * np.sin(2 * theta) * (3 * np.pi / 2 * t**2)
+        geometry = Geometry.from_degrees(theta_i=0.0, theta_r=np.degrees(theta))
+        return float(np.sum(weights * ring * self.brdf(geometry)))
 
     def reflected(self, normal: FloatArray, to_lamp: FloatArray) -> FloatArray:
         """Return BRDF x cos(theta_i) (N,) for a viewer along z, a lamp (3,) and normals (N, 3).

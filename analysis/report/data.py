@@ -89,6 +89,28 @@ class LampLevels:
     stretch: IntArray
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rendered:
+    """Sphere of the fitted material and of Lambert's law, and a profile as each would find it.
+
+    name: of the model. albedo: of Lambert's law. model, lambert: radiance (R, C), NaN beside the
+    sphere. places (N,): across the profile of a shape; heights (N,): the true ones there, and as
+    found by each law. scene: lamp and scale. cost: what Lambert's law would cost, in a sentence.
+    """
+
+    name: str
+    albedo: float
+    model: FloatArray
+    lambert: FloatArray
+    shape: str
+    places: FloatArray
+    heights: FloatArray
+    lambert_heights: FloatArray
+    model_heights: FloatArray
+    scene: str
+    cost: str
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportData:
     """Content of a report. Arrays and `flags` have one entry per point (N,).
@@ -103,7 +125,8 @@ class ReportData:
     budget: rows of (component, median relative u in %, share of the variance in %).
     sources: relative standard uncertainties (N,) by source, those of one kind combined.
     chosen_for: what a scan that chose its geometries measured each point for; else empty.
-    lamp: levels at the drift checks. calibrations, files: what they found, and hashes.
+    rendered: makes pictures of the chosen model. lamp: levels at the drift checks.
+    calibrations, files: what they found, and hashes.
     """
 
     title: str
@@ -128,6 +151,7 @@ class ReportData:
     chosen_for: tuple[str, ...] = ()
     lamp: tuple[LampLevels, ...] = ()
     previews: tuple[Preview, ...] = ()
+    rendered: Callable[[], Rendered | None] | None = None
     rig: Rows = ()
     devices: Rows = ()
     calibrations: Rows = ()

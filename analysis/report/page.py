@@ -14,6 +14,7 @@ from analysis.report.figure_list import budget_figure, chart_figures, drift_figu
 from analysis.report.point_texts import points_html
 from analysis.report.sections.models_html import candidates_html, verdict_html
 from analysis.report.sections.pictures_html import pictures_html
+from analysis.report.sections.rendered_html import rendered_html
 from analysis.report.style import (
     CSS,
     HOVER,
@@ -46,6 +47,7 @@ def report_html(data: ReportData) -> str:
         _attention(data),
         _charts(data, sweeps),
         candidates_html(data),
+        rendered_html(data.rendered),
         _flagged(data),
         _budget(data, sweeps),
         _drift(data),

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.commands.outcomes.fitted_table import fitted_table
+from acquisition.results.facts.rendered_material import rendered_material
 from acquisition.results.report_inputs import candidates_of
 from acquisition.results.sources import Source
 from acquisition.results.summary import verdict_sentence
@@ -60,6 +61,7 @@ def _report_data(
         fitted=np.full(m.size, choice is not None),
         candidates=() if choice is None else candidates_of(choice),
         relative_brdf=m.relative,
+        rendered=rendered_material(chosen, None),
         metadata=_origin(path),
         versions=tuple(versions_of("gonio", *LIBRARIES, "matplotlib").items()),
     )
