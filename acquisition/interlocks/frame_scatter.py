@@ -8,7 +8,8 @@ raises the noise of this and of later readings, up to what the rig file states f
 level; what exceeds that too is flagged, and ends the scan where reading after reading has it.
 
 All readings of a scan so far tell the flicker. A few tell it badly: two frames agree by chance, the
-reading then counts for more than it is worth, and a fit follows it.
+reading then counts for more than it is worth, and a fit follows it. Each reading therefore keeps
+its scatter, and once the scan is reduced, all of them tell the flicker of each (`flicker_share`).
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from instrument.config.rig import Rig
 from instrument.devices import Frame
 from instrument.errors import Interlock
 from instrument.geometry import FloatArray
+from instrument.record.reading import Reading
 
 FLAG = "frames differ"
 # Limit of chi-squared, as a deviation of a normal distribution: a scatter that is surely too large
@@ -38,29 +40,27 @@ _RECENT = 8  # readings
 # Variance of a pixel relative to the rig file's: 16 of read noise where the true full well is a
 # quarter. More is no noise, but a frame that differs.
 _MOST_NOISE = 20.0
+_LEAST_VARIANCE = 1e-12  # in DN^2
 
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """Scatter of frame means in one reading, all in DN or DN^2.
+    """Scatter of frame means in one reading, in DN^2.
 
-    deviations_dn (frames,): of each frame's mean from the mean of all. pixel_variance: of one
-    frame's mean by pixel noise. allowed_variance: by flicker and black level.
+    freedom: degrees of freedom. squares: sum of the squared deviations of each frame's mean from
+    the mean of all. pixel_variance: of one frame's mean by pixel noise. allowed_variance: by
+    flicker and black level.
     """
 
-    deviations_dn: FloatArray
+    freedom: int
+    squares: float
     pixel_variance: float
     allowed_variance: float
 
     @property
-    def freedom(self) -> int:
-        """Degrees of freedom."""
-        return self.deviations_dn.size - 1
-
-    @property
-    def squares(self) -> float:
-        """Sum of the squared deviations."""
-        return float(self.deviations_dn @ self.deviations_dn)
+    def standard_deviation(self) -> float:
+        """Standard deviation of a frame's mean, in DN; 0 for a single frame."""
+        return math.sqrt(self.squares / max(self.freedom, 1))
 
     @property
     def noise_ratio(self) -> float:
@@ -71,6 +71,16 @@ class Scatter:
     def ratio(self) -> float:
         """Sum of squares relative to the variance that noise and rig file allow: chi-squared."""
         return self.squares / (self.pixel_variance + self.allowed_variance)
+
+    @property
+    def mean_ratio(self) -> float:
+        """Ratio to the allowed variance per degree of freedom: the larger, the worse."""
+        return self.ratio / max(self.freedom, 1)
+
+    @property
+    def differs(self) -> bool:
+        """True for a reading to flag: its frames surely differ by more than is allowed."""
+        return self.ratio > chi_squared_limit(self.freedom, _SURE_SIGMA)
 
     def explained(self, share: float) -> Scatter:
         """Return a copy in which a share, 0 to 1, of what is allowed counts as pixel noise."""
@@ -119,19 +129,42 @@ class _Sums:
         return 1.0 if excess >= self.allowed_variance else excess / self.allowed_variance
 
 
-def frame_scatter(
-    frames: Sequence[Frame], signal: Signal, dark: Dark, window: Window, rig: Rig
+def flicker_share(readings: Iterable[Scatter]) -> float:
+    """Return the share, 0 to 1, of the allowed variance that all readings of a scan show.
+
+    Readings whose frames differ do not count; the worst of the others stands by itself.
+    """
+    several = [one for one in readings if one.freedom and not one.differs]
+    return _Sums.of(sorted(several, key=lambda one: one.mean_ratio)[:-1]).share
+
+
+def scatter_of(reading: Reading, rig: Rig) -> Scatter:
+    """Return the scatter of a reading as the record keeps it."""
+    freedom = max(reading.frames - 1, 0)
+    flicker_dn, black_dn = rig.lamp.u_flicker * reading.signal_dn, rig.camera.u_black_level_dn
+    return Scatter(
+        freedom=freedom,
+        squares=freedom * reading.scatter_dn**2,
+        pixel_variance=max(reading.frames * reading.u_pixel_dn**2, _LEAST_VARIANCE),
+        allowed_variance=flicker_dn**2 + black_dn**2,
+    )
+
+
+def _frame_scatter(
+    deviations_dn: FloatArray, frames: int, signal: Signal, window: Window, rig: Rig
 ) -> Scatter:
     """Return the scatter of the window's mean; a single frame has none, and no freedom."""
-    window, _ = without_hot_pixels(window, dark.hot)
     total, squares = float(window.weights.sum()), float(np.vdot(window.weights, window.weights))
     level_dn = rig.camera.black_level_dn + max(signal.signal_dn, 0.0) / total
     predicted = squares * float(photon_transfer(np.asarray(level_dn), rig.camera))
-    shown = min(len(frames) * signal.u_noise_dn**2, _MOST_NOISE * predicted)
+    shown = min(frames * signal.u_noise_dn**2, _MOST_NOISE * predicted)
     flicker_dn = rig.lamp.u_flicker * signal.signal_dn
     black_dn = rig.camera.u_black_level_dn * total
     return Scatter(
-        _deviations_dn(frames, window), max(predicted, shown, 1e-12), flicker_dn**2 + black_dn**2
+        freedom=frames - 1,
+        squares=float(deviations_dn @ deviations_dn),
+        pixel_variance=max(predicted, shown, _LEAST_VARIANCE),
+        allowed_variance=flicker_dn**2 + black_dn**2,
     )
 
 
@@ -164,6 +197,8 @@ class FrameScatter:
     # All readings that were not flagged; the worst of them stands by itself.
     _so_far: _Sums = field(default_factory=_Sums)
     _worst: Scatter | None = None
+    # Deviation of each frame's mean in the last reading of several frames, for messages.
+    _last_dn: FloatArray = field(default_factory=lambda: np.zeros(1))
 
     def judged(
         self, signal: Signal, frames: Sequence[Frame], dark: Dark, window: Window, name: str
@@ -172,16 +207,23 @@ class FrameScatter:
 
         Raises `Interlock` where it is not the first such reading.
         """
-        if not signal.window_pixels > 0 or not (self._recent or len(frames) > 1):
+        if not signal.window_pixels > 0:
             return signal
-        found = frame_scatter(frames, signal, dark, window, self.rig)
+        window, _ = without_hot_pixels(window, dark.hot)
+        deviations_dn = _deviations_dn(frames, window)
+        found = _frame_scatter(deviations_dn, len(frames), signal, window, self.rig)
+        u_pixel_dn = math.sqrt(found.pixel_variance / len(frames))
+        signal = replace(signal, u_pixel_dn=u_pixel_dn, scatter_dn=found.standard_deviation)
         if found.freedom:
+            self._last_dn = deviations_dn
             self._remember(found)
+        if not self._recent:
+            return signal
         excess = self._excess_variance(found) / len(frames)
         if excess > 0:
             signal = replace(signal, u_noise_dn=math.hypot(signal.u_noise_dn, math.sqrt(excess)))
         flags = [signal.flags] * bool(signal.flags)
-        if found.ratio > chi_squared_limit(found.freedom, _SURE_SIGMA):
+        if found.differs:
             self.note(f"{name}: {FLAG}: {self._text(found, signal)}")
             flags.append(FLAG)
         self._require_steady(signal, name)
@@ -189,16 +231,16 @@ class FrameScatter:
 
     def _without_worst(self) -> list[Scatter]:
         """Return the last readings, the worst left out if there are others."""
-        order = sorted(self._recent, key=lambda one: one.ratio / one.freedom)
+        order = sorted(self._recent, key=lambda one: one.mean_ratio)
         return order[:-1] or order
 
     def _remember(self, found: Scatter) -> None:
         """Count a reading of several frames, among all of the scan if it is not to be flagged."""
         self._recent.append(found)
-        if found.ratio > chi_squared_limit(found.freedom, _SURE_SIGMA):
+        if found.differs:
             return
         worst = self._worst
-        if worst is None or found.ratio / found.freedom > worst.ratio / worst.freedom:
+        if worst is None or found.mean_ratio > worst.mean_ratio:
             self._worst, found = found, worst or found
         if worst is not None:
             self._so_far.add(found)
@@ -233,12 +275,11 @@ class FrameScatter:
         )
 
     def _text(self, found: Scatter, signal: Signal) -> str:
-        worst = int(np.argmax(np.abs(found.deviations_dn)))
-        rms = math.sqrt(found.squares / found.freedom)
+        worst = int(np.argmax(np.abs(self._last_dn)))
         return (
-            f"the window's mean scatters by {rms:.3g} DN of {signal.signal_dn:.4g} DN from frame "
-            f"to frame, most in frame {worst + 1} of {found.deviations_dn.size} "
-            f"({found.deviations_dn[worst]:+.3g} DN); noise explains "
+            f"the window's mean scatters by {found.standard_deviation:.3g} DN of "
+            f"{signal.signal_dn:.4g} DN from frame to frame, most in frame {worst + 1} of "
+            f"{self._last_dn.size} ({self._last_dn[worst]:+.3g} DN); noise explains "
             f"{math.sqrt(found.pixel_variance):.2g} DN, the rig file allows "
             f"{math.sqrt(found.allowed_variance):.2g} DN (lamp: u_flicker "
             f"{self.rig.lamp.u_flicker:g}, camera: u_black_level_dn "

@@ -51,7 +51,8 @@ class Signal:
     `u_placement_dn` is the first-order effect of a misplaced sample, with the sign of the change
     for a sample too close to the camera; `u_texture_dn` is the second-order effect, with the effect
     of hot and dead pixels left out and of single saturated ones. `window_pixels`: area that counts.
-    `patch_dn` and what follows it: see `acquisition.measure.stray_light`.
+    `patch_dn` and what follows it: see `acquisition.measure.stray_light`; `u_pixel_dn` and
+    `scatter_dn`: see `Reading`, and `acquisition.interlocks.frame_scatter`, which sets them.
     """
 
     signal_dn: float
@@ -72,6 +73,8 @@ class Signal:
     near_patch_dn: float = 0.0
     middle_patch_dn: float = 0.0
     far_patch_dn: float = 0.0
+    u_pixel_dn: float = 0.0
+    scatter_dn: float = 0.0
 
 
 def average_dark(frames: Sequence[Frame], camera: CameraConfig) -> Dark:

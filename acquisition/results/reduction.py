@@ -22,6 +22,7 @@ from acquisition.measure.placement import tilt_deg
 from acquisition.measure.scattering import StrayLight, stray_light
 from acquisition.measure.white_tile import Standard, standard
 from acquisition.results.effects.effect import Readings
+from acquisition.results.effects.flicker import with_flicker
 from acquisition.results.effects.lamp_level import drift_between, drift_noise, wander
 from acquisition.results.effects.lens import STRAY
 from acquisition.results.effects.rig_effects import has_effects, rig_effects
@@ -128,11 +129,11 @@ def reduced_run(record: Record, loaded: Loaded) -> Reduced:
 
 def reduced_rows(rows: Rows, loaded: Loaded) -> Reduced:
     """Return radiance and BRDF of all points in rows of a record, complete or not."""
-    readings = rows.readings
+    readings, checks = with_flicker(rows.readings, rows.checks, loaded.rig)
     doubted = doubted_steps(readings, rows.events)
     stray = stray_light(readings, loaded.rig)
     own = readings if stray is None else stray.subtracted(readings)
-    reduced = reduce(own, loaded.protocol, rows.checks, doubted)
+    reduced = reduce(own, loaded.protocol, checks, doubted)
     blurred, turned = turning_errors(reduced.points, reduced.radiance)
     if blurred:
         components = {**reduced.components, **blurred}

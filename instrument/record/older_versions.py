@@ -34,5 +34,5 @@ CREATE TABLE drift_at_resume (before_step INTEGER NOT NULL, expected REAL NOT NU
                               step INTEGER NOT NULL, {_READING_3});
 """
 
-OLDER_SQL = {3: _SQL_3, **{version: tables_sql(version) for version in (4, 5, 6)}}
+OLDER_SQL = {3: _SQL_3, **{version: tables_sql(version) for version in (4, 5, 6, 7)}}
 """The statements that make the tables, by schema version."""

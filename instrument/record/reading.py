@@ -36,6 +36,8 @@ class Reading:
     over it, `u_turn_deg` its standard uncertainty by the time stamps, and `u_latency_deg` (signed:
     the directions of turning have opposite signs) that by the latency between camera and axis,
     which all readings of one exposure share.
+    `u_pixel_dn`: u of the signal by photon and read-out noise alone. `scatter_dn`: standard
+    deviation of the window's mean from frame to frame, 0 for a single frame.
     `time_s` is the scan time at the middle of the frames, without interruptions of the scan;
     `free_s` is the time at which the rig could move on, the dark having been taken.
     """
@@ -74,6 +76,8 @@ class Reading:
     blur_deg: float = 0.0
     u_turn_deg: float = 0.0
     u_latency_deg: float = 0.0
+    u_pixel_dn: float = 0.0
+    scatter_dn: float = 0.0
 
     @property
     def u_light_dn(self) -> float:

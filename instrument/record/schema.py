@@ -20,8 +20,9 @@ from instrument.record.reading import Kind
 from instrument.record.write_lock import TRY_S
 from instrument.text.network_share import network_share
 
-SCHEMA_VERSION = 7
-FIRST_STRICT, _FIRST_SEALED, _FIRST_STRAY_LIGHT, _FIRST_FLIGHT = 4, 5, 6, 7  # schema versions
+SCHEMA_VERSION = 8
+FIRST_STRICT, _FIRST_SEALED = 4, 5  # schema versions
+_FIRST_STRAY_LIGHT, _FIRST_FLIGHT, _FIRST_SCATTER = 6, 7, 8
 MOST_BYTES = 128 * 1024**2  # of one text or picture; the largest camera's picture needs half of it
 LEAST_SQLITE = (3, 37, 0)  # the first with STRICT tables
 _OPENING_S = 2.0  # of waiting for a lock; nothing moves yet
@@ -114,6 +115,10 @@ _FLIGHT = (
     _number("u_turn_deg", 0.0, 360.0),
     _number("u_latency_deg", -360.0, 360.0),
 )
+_SCATTER = (
+    _number("u_pixel_dn", 0.0, optional=True),
+    _number("scatter_dn", 0.0, optional=True),
+)
 _READING = (
     _integer("step"),
     _word("kind", get_args(Kind)),
@@ -140,6 +145,7 @@ _READING = (
     _plain("flags"),
     *_STRAY_LIGHT,
     *_FLIGHT,
+    *_SCATTER,
 )
 TABLES: dict[str, tuple[Column, ...]] = {
     "meta": (_text("key"), _META_VALUE),
@@ -171,7 +177,10 @@ TABLES: dict[str, tuple[Column, ...]] = {
 
 def tables_of(version: int) -> dict[str, tuple[Column, ...]]:
     """Return the tables of a schema version; the columns that came later are always the last."""
-    later = _FLIGHT * (version < _FIRST_FLIGHT) + _STRAY_LIGHT * (version < _FIRST_STRAY_LIGHT)
+    groups = (
+        (_FIRST_STRAY_LIGHT, _STRAY_LIGHT), (_FIRST_FLIGHT, _FLIGHT), (_FIRST_SCATTER, _SCATTER)
+    )  # fmt: skip
+    later = {column for first, columns in groups for column in columns if version < first}
     return {name: tuple(c for c in own if c not in later) for name, own in TABLES.items()}
 
 

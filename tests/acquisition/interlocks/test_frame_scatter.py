@@ -49,10 +49,11 @@ class Bench:
         )
 
     def signals(self, frames: list[Frame]) -> tuple[Signal, Signal]:
-        """Measured, and judged."""
+        """Measured, with the scatter that only the judge tells, and judged."""
         signal = signal_of(frames, self.dark, self.rig)
         judged = self.judge.judged(signal, frames, self.dark, self.window, "step 3")
-        return signal, judged
+        told = {"u_pixel_dn": judged.u_pixel_dn, "scatter_dn": judged.scatter_dn}
+        return replace(signal, **told), judged
 
     def scan(self, flicker: float, count: int) -> None:
         """Judge 49 readings under a lamp that flickers."""

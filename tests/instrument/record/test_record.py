@@ -40,7 +40,7 @@ def test_another_tool_reads_it_while_the_scan_runs(tmp_path: Path) -> None:
         assert other.execute("SELECT theta_r_deg FROM reading").fetchall() == [(-20.0,)]
         assert other.execute("PRAGMA journal_mode").fetchone() == ("wal",)
         other.close()
-        assert record.meta("schema_version") == "7"
+        assert record.meta("schema_version") == "8"
 
 
 def test_a_value_that_could_not_be_measured_stays_unknown(tmp_path: Path) -> None:

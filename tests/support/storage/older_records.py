@@ -60,7 +60,7 @@ def seal_again(database: sqlite3.Connection) -> None:
 def _seal_table(database: sqlite3.Connection, table: str) -> None:
     present = {row[1] for row in database.execute(f"PRAGMA table_info({table})")}
     version = next(
-        v for v in (SCHEMA_VERSION, 6, 5) if {c.name for c in tables_of(v)[table]} <= present
+        v for v in (SCHEMA_VERSION, 7, 6, 5) if {c.name for c in tables_of(v)[table]} <= present
     )
     names = ", ".join(c.name for c in tables_of(version)[table] if c is not ASSIGNED)
     database.text_factory = bytes  # a forged text may be no UTF-8

@@ -50,5 +50,5 @@ def test_a_run_of_an_older_version_gives_the_same_results(
     assert results(old) == results(run)
     with Record.open(old) as record, Record.open(run) as whole:
         assert record.meta("schema_version") == str(version)
-        assert whole.meta("schema_version") == "7"
+        assert whole.meta("schema_version") == "8"
         assert len(record.readings()) == len(whole.readings()) > 7
