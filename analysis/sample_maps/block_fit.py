@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.sample_maps.cell_fit import CellFits, fit_cells
 from analysis.sample_maps.places import TableField
+from analysis.sample_maps.shared_misfit import chi2_beyond_shared
 from instrument.geometry import FloatArray
 
 _LARGEST_ANGLE = 0.1  # degrees, from the middle of a block to its side
@@ -25,7 +26,10 @@ class CellData:
     x_mm (columns,), y_mm (rows,): places. floor, per_brdf, relative: (K,) each; the variance of a
     value is floor + per_brdf * brdf + (relative * brdf)^2, in 1/sr^2. texture (rows, columns):
     relative change of the light for each mm beside a cell, which the u of its place in each
-    picture, place_mm (K,), turns into a u of its own.
+    picture, place_mm (K,), turns into a u of its own. bend (rows, columns): relative difference of
+    a cell from the mean of its two neighbours along x, of which each picture shows the share
+    blur (K,). shared (K, M): relative shifts of all cells
+    by one u of each error that they share, beside shared_mm (K,), that of their place.
     """
 
     brdf: NDArray[np.float32]
@@ -36,6 +40,10 @@ class CellData:
     relative: FloatArray
     texture: FloatArray | None = None
     place_mm: FloatArray | None = None
+    bend: FloatArray | None = None
+    blur: FloatArray | None = None
+    shared: FloatArray | None = None
+    shared_mm: FloatArray | None = None
 
     def block(self, rows: slice, columns: slice) -> tuple[FloatArray, FloatArray]:
         """Return BRDF (K, C) in 1/sr of the block's cells, and its variance (K, C)."""
@@ -44,7 +52,16 @@ class CellData:
         variance = self.variance(brdf)
         if self.texture is not None and self.place_mm is not None:
             variance += (np.outer(self.place_mm, self.texture[rows, columns]) * brdf) ** 2
+        if self.bend is not None and self.blur is not None:
+            variance += (np.outer(self.blur, self.bend[rows, columns]) * brdf) ** 2
         return brdf, variance
+
+    def shared_of(self, rows: slice, columns: slice) -> FloatArray | None:
+        """Return the relative shifts (K, M) of the block's cells by all that cells share."""
+        if self.shared is None or self.texture is None or self.shared_mm is None:
+            return self.shared
+        slope = float(np.median(self.texture[rows, columns]))
+        return np.column_stack([self.shared, slope * self.shared_mm])
 
     def variance(self, brdf: FloatArray) -> FloatArray:
         """Return the variance, in 1/sr^2, of values (K,) or (K, C) in 1/sr."""
@@ -66,7 +83,10 @@ def fit_blocks(data: CellData, tables: TableField, distance_mm: float) -> dict[s
     def fit(block: tuple[slice, slice]) -> None:
         rows, columns = block
         table = tables.at(float(data.x_mm[columns].mean()), float(data.y_mm[rows].mean()))
-        fits = fit_cells(table, *data.block(rows, columns))
+        brdf, variance = data.block(rows, columns)
+        fits, shared = fit_cells(table, brdf, variance), data.shared_of(rows, columns)
+        if shared is not None:
+            fits = replace(fits, chi2=chi2_beyond_shared(table, fits, brdf, variance, shared))
         for name, values in found.items():
             own = values[rows, columns]
             own[...] = getattr(fits, name).reshape(own.shape)

@@ -82,7 +82,9 @@ def fit_cells(table: SigmaTable, brdf: NDArray[np.floating], variance: FloatArra
     A value or variance that is NaN, or a variance of 0 or infinity, is left out of its cell.
     """
     usable = np.isfinite(brdf) & np.isfinite(variance) & (variance > 0)
-    weight = np.divide(1.0, variance, out=np.zeros(variance.shape), where=usable)
+    count = usable.sum(axis=0)
+    poor = count <= len(table.parameters)
+    weight = np.divide(1.0, variance, out=np.zeros(variance.shape), where=usable & ~poor)
     y = np.where(usable, brdf, 0.0).astype(np.float64)
     sums, lobe = _sums(table, y, weight)
     fits = _minimum(table, sums, lobe)
@@ -92,8 +94,6 @@ def fit_cells(table: SigmaTable, brdf: NDArray[np.floating], variance: FloatArra
             without = _minimum(table, _Sums(*(a[..., dark] for a in sums)), None)
             for name in ("albedo", "u_albedo", "sigma_deg", "u_sigma_deg", "chi2", "ks"):
                 fits[name][dark] = without[name]
-    count = usable.sum(axis=0)
-    poor = count <= len(table.parameters)
     for values in fits.values():
         values[poor] = np.nan
     return CellFits(**fits, count=count.astype(np.int64))

@@ -185,8 +185,9 @@ def _misfit(found: SampleMap) -> str:
     share = 100 * found.rejected_share
     text = (
         f"The model does not hold in {rejected} of {fitted} cells ({short_number(share, 3)} %): "
-        "their χ² is one that chance gives to one cell of 1000. An edge between two surfaces is "
-        "such a place, where a cell shows more or less of either as the camera turns."
+        "their χ² is one that chance gives to one cell of 1000, with the errors that all cells "
+        "share allowed for, such as those of the angles. A cell on an edge between two surfaces "
+        "may be such a place."
     )
     dof = np.maximum(np.nan_to_num(found.count) - len(found.values), 1)
     ratio = np.minimum(found.chi2 / dof, _MOST_CHI2 + 0.01)

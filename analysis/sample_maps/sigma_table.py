@@ -66,6 +66,16 @@ class SigmaTable:
         shifted = (low + _NARROW_DEG) * np.exp(rate * place)
         return shifted - _NARROW_DEG, rate * shifted
 
+    def place_of(self, sigma_deg: FloatArray) -> FloatArray:
+        """Return the places (...) in the table of values of sigma (...) in degrees."""
+        low, high, last = self.sigma_deg[0], self.sigma_deg[-1], self.sigma_deg.size - 1
+        if self.lobe is None:
+            return np.asarray((sigma_deg - low) * (last / (high - low)))
+        shifted = (sigma_deg + _NARROW_DEG) / (low + _NARROW_DEG)
+        return np.asarray(
+            np.log(shifted) * (last / np.log((high + _NARROW_DEG) / (low + _NARROW_DEG)))
+        )
+
     @property
     def even(self) -> bool:
         """True if the table begins at sigma = 0, about which it is symmetric."""

@@ -27,7 +27,7 @@ from sim.defects.mechanics import leaning_homography, turned
 from sim.defects.picture import scattered
 from sim.scene.board import marker_on, marker_size_mm, print_on
 from sim.scene.scene import BOARD_PLACES, PAPER, Scene
-from sim.scene.variation import blended, share_at, shares_to_render
+from sim.scene.variation import blended, region_mm, share_at, shares_to_render
 
 _NODES = 9  # per side: interpolation error below 4e-5 of the radiance, 5e-6 of an image's mean
 
@@ -156,13 +156,19 @@ def _parts(scene: Scene) -> list[Scene]:
 
 def _share(scene: Scene, projection: _Projection) -> FloatArray:
     """Share of the sample's other parameters over the outline's crop."""
-    assert scene.sample.variation is not None
-    columns, rows = np.meshgrid(
-        *(np.arange(s.start, s.stop) for s in projection.outline.crop[::-1])
-    )
+    variation, crop = scene.sample.variation, projection.outline.crop
+    assert variation is not None
+    if variation.pattern != "gradient":
+        camera, corners = scene.rig.camera, region_mm(variation, scene.sample_size)
+        outline = apply_homography(projection.homography, corners)
+        region = polygon_coverage(outline, camera.width_px, camera.height_px)
+        whole = np.zeros((camera.height_px, camera.width_px))
+        whole[region.crop] = region.fraction
+        return whole[crop]
+    columns, rows = np.meshgrid(*(np.arange(s.start, s.stop) for s in crop[::-1]))
     to_surface = np.linalg.inv(projection.homography).astype(np.float64)
     points_mm = apply_homography(to_surface, np.stack([columns, rows], axis=-1))
-    return share_at(points_mm, scene.sample.variation, scene.sample_size)
+    return share_at(points_mm, variation, scene.sample_size)
 
 
 def _chebyshev_grid(pixels: int) -> tuple[FloatArray, FloatImage]:

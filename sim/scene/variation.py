@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from instrument.config.protocol import Sample, Variation
 from instrument.geometry import FloatArray
+from instrument.pinhole import rectangle_mm
 
 # Shares at which the radiance of a gradient is rendered; between them it is a polynomial.
 _GRADIENT = (0.0, 0.146447, 0.5, 0.853553, 1.0)
@@ -30,6 +31,18 @@ def share_at(points_mm: FloatArray, variation: Variation, sample: Sample) -> Flo
         return np.asarray(np.clip(0.5 + x / sample.width_mm, 0.0, 1.0))
     half = variation.size_mm / 2
     return np.asarray((np.abs(x) <= half) & (np.abs(y) <= half), dtype=np.float64)
+
+
+def region_mm(variation: Variation, sample: Sample) -> FloatArray:
+    """Return the corners (4, 2) in mm of the places with the other parameters; not of a gradient.
+
+    A pixel on an edge of them holds both surfaces, by the share of it that each covers.
+    """
+    if variation.pattern == "halves":
+        # Twice the half, as the sample's own outline cuts it.
+        middle = np.array([sample.width_mm / 2, 0.0])
+        return np.asarray(rectangle_mm(sample.width_mm, 2 * sample.height_mm) + middle)
+    return rectangle_mm(variation.size_mm, variation.size_mm)
 
 
 def blended(radiance: Sequence[NDArray[np.floating]], share: FloatArray) -> FloatArray:

@@ -35,10 +35,17 @@ class Sampling:
     noise: float
 
 
-def rectify(light: FloatImage, grid: CellGrid, pinhole: Pinhole, theta_r_deg: float) -> FloatImage:
+def rectify(
+    light: FloatImage,
+    grid: CellGrid,
+    pinhole: Pinhole,
+    theta_r_deg: float,
+    height_mm: float = 0.0,
+) -> FloatImage:
     """Return the light of each cell, (rows, columns) of the grid, in the unit of the pixels' light.
 
-    NaN for a cell that lies partly outside the picture, or has a pixel without a value.
+    height_mm: of the surface above the rotation axis. NaN for a cell that lies partly outside the
+    picture, or has a pixel without a value.
     """
     import cv2
 
@@ -47,7 +54,7 @@ def rectify(light: FloatImage, grid: CellGrid, pinhole: Pinhole, theta_r_deg: fl
     size = grid.columns * across, grid.rows * down
     points = cv2.warpPerspective(
         light,
-        pinhole.homography(theta_r_deg) @ grid.to_mm(sampled.per_cell),
+        pinhole.homography(theta_r_deg, height_mm) @ grid.to_mm(sampled.per_cell),
         size,
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_CONSTANT,

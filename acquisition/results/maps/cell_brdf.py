@@ -18,7 +18,7 @@ from acquisition.measure.rectify.cell_grid import CellGrid
 from acquisition.measure.rectify.rectified import LEAST_SHARE, off_edge, sampling
 from acquisition.results.maps.kept_cells import CellLight
 from acquisition.results.maps.mean_curve import MeanCurve
-from acquisition.results.maps.surface_height import Height, at_height, smoothing
+from acquisition.results.maps.surface_height import Height
 from analysis.sample_maps.block_fit import CellData
 from analysis.sample_maps.places import Places
 from instrument.config.load import Loaded
@@ -77,7 +77,7 @@ def cell_data(
     for k in range(count):
         brdf[k] += np.float32(offset[k])
         brdf[k] *= np.float32(factor[k])
-    _leave_out_edges(brdf, readings, grid, loaded)
+    leave_out_edges(brdf, readings, grid, loaded)
     noise = np.empty(count)
     for k, reading in enumerate(readings):
         seen = sampling(grid, Pinhole.of(rig), reading.theta_r_deg)
@@ -88,8 +88,8 @@ def cell_data(
         brdf=brdf,
         x_mm=grid.x_mm,
         y_mm=grid.y_mm,
-        floor=factor**2 * noise * floor,
-        per_brdf=factor * noise * per_dn,
+        floor=factor**2 * noise * light.smoothing * floor,
+        per_brdf=factor * noise * light.smoothing * per_dn,
         relative=curve.u_own,
     )
 
@@ -114,53 +114,66 @@ def pixel_variance(frames: FloatArray, loaded: Loaded) -> tuple[FloatArray, Floa
 
 
 def in_own_light(
-    data: CellData,
-    readings: Sequence[Reading],
-    height: Height,
-    grid: CellGrid,
-    rig: Rig,
+    data: CellData, readings: Sequence[Reading], height: Height, blur: FloatArray, rig: Rig
 ) -> CellData:
-    """Return the cells of a surface at a height, each divided by its own light, in place.
+    """Return the cells, in 1/sr, of a surface at a height, each divided by its own light, in place.
 
-    With the variance that moving them leaves.
+    With what their places, and neighbours that are mixed in, may change. blur: (K,), as
+    `CellLight.blur`.
     """
-    pinhole = Pinhole.of(rig)
     for k, reading in enumerate(readings):
-        own = at_height(data.brdf[k], reading.theta_r_deg, height.mm, grid, pinhole)
         on_axis = places_of([reading], rig)
-        light = places_of([reading], rig, height.mm).irradiance(grid.x_mm, grid.y_mm)[0]
+        light = places_of([reading], rig, height.mm).irradiance(data.x_mm, data.y_mm)[0]
         light *= float(_light_at_height(on_axis, height.mm))
-        np.divide(own, light.astype(np.float32), out=data.brdf[k])
+        data.brdf[k] /= light.astype(np.float32)
     theta_r_deg = np.array([r.theta_r_deg for r in readings])
-    less = smoothing(theta_r_deg, height.mm, grid.cell_mm)
+    cell_mm = abs(float(data.x_mm[1] - data.x_mm[0]))
+    texture, bend = _texture(data.brdf, theta_r_deg, cell_mm)
     return replace(
         data,
-        floor=data.floor * less,
-        per_brdf=data.per_brdf * less,
-        texture=_texture_per_mm(data.brdf, theta_r_deg, grid.cell_mm),
-        place_mm=_u_place_mm(theta_r_deg, rig),
+        texture=texture,
+        place_mm=_u_place_mm(theta_r_deg, height, rig),
+        bend=bend,
+        blur=blur + _pixel_blur(theta_r_deg, cell_mm, rig),
     )
 
 
-def _texture_per_mm(
+def _texture(
     brdf: NDArray[np.float32], theta_r_deg: FloatArray, cell_mm: float
-) -> FloatArray:
-    """Return the relative change of each cell's light (rows, columns) for a mm along x."""
+) -> tuple[FloatArray, FloatArray]:
+    """Return the relative change of each cell's light along x, (rows, columns) each.
+
+    For a mm, signed; and the difference of a cell from the mean of its two neighbours.
+    """
     near = brdf[np.argsort(np.abs(theta_r_deg))[:_NEAREST]]
     known = np.isfinite(near)
     mean = np.where(known, near, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    by_mm = np.gradient(mean, cell_mm, axis=1)
-    return np.asarray(np.abs(by_mm) / np.where(mean > 0, mean, np.inf))
+    level = np.where(mean > 0, mean, np.inf)
+    bend = np.zeros(mean.shape)
+    bend[:, 1:-1] = mean[:, 1:-1] - (mean[:, :-2] + mean[:, 2:]) / 2
+    return np.asarray(np.gradient(mean, cell_mm, axis=1) / level), bend / level
 
 
-def _u_place_mm(theta_r_deg: FloatArray, rig: Rig) -> FloatArray:
+def _u_place_mm(theta_r_deg: FloatArray, height: Height, rig: Rig) -> FloatArray:
     """Return the u (K,) in mm of the place that a cell has in each picture.
 
     By the surface's height, as well as a texture tells it, and by what the camera's pixels blur.
     """
     theta_r = np.radians(theta_r_deg)
     pixel_mm = rig.camera.field_width_mm / rig.camera.width_px
-    return np.hypot(_U_HEIGHT_MM * np.tan(theta_r), _U_PIXELS * pixel_mm / np.cos(theta_r))
+    u_mm = height.u_mm if np.isfinite(height.u_mm) else _U_HEIGHT_MM
+    return np.hypot(u_mm * np.tan(theta_r), _U_PIXELS * pixel_mm / np.cos(theta_r))
+
+
+def _pixel_blur(theta_r_deg: FloatArray, cell_mm: float, rig: Rig) -> FloatArray:
+    """Return the share (K,) of the difference from neighbours that pixels blur, beyond the least.
+
+    A pixel, and the interpolation between two, spread light with a variance of 1/12 and 1/6 of its
+    width squared; a pixel's width on the sample grows with the view angle.
+    """
+    pixel_mm = rig.camera.field_width_mm / rig.camera.width_px
+    width = pixel_mm / (cell_mm * np.cos(np.radians(theta_r_deg)))
+    return np.asarray((width**2 - np.min(width**2)) / 4)
 
 
 def _light_at_height(places: Places, height_mm: float) -> float:
@@ -170,10 +183,13 @@ def _light_at_height(places: Places, height_mm: float) -> float:
     return float((z - height_mm) / z * nearer**1.5)
 
 
-def _leave_out_edges(
+def leave_out_edges(
     brdf: NDArray[np.float32], readings: Sequence[Reading], grid: CellGrid, loaded: Loaded
 ) -> None:
-    """Set cells to NaN that a misplaced or blurred edge of the sample may touch."""
+    """Set cells (K, rows, columns), in 1/sr or any unit, to NaN that the sample's edge may touch.
+
+    Misplaced, or blurred by the pixels.
+    """
     sample, rig = loaded.protocol.sample, loaded.rig
     pixel_mm = rig.camera.field_width_mm / rig.camera.width_px
     for k, reading in enumerate(readings):

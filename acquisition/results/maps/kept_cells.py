@@ -17,6 +17,7 @@ from acquisition.measure.rectify.cell_grid import CellGrid
 from acquisition.measure.rectify.kept_files import cells_name, dark_name, step_of
 from acquisition.measure.rectify.light import FloatImage, light_dn, window_dn
 from acquisition.measure.rectify.rectified import rectify
+from acquisition.results.maps.surface_height import at_height, smoothing
 from instrument.config.load import Loaded
 from instrument.errors import InputError
 from instrument.geometry import BoolArray, FloatArray
@@ -26,6 +27,8 @@ from instrument.record.record import Record
 from instrument.text.atomic_file import read_file
 
 _WORKERS = 2
+_SEARCHED = 192  # cells along a side, at most, in which the height is looked for
+_U_HEIGHT = 0.2  # of gathered cells: an edge within one seems to move more, or less (own trial)
 _SHOWN = 3  # names of missing files in a message
 
 
@@ -33,20 +36,26 @@ _SHOWN = 3  # names of missing files in a message
 class CellLight:
     """Light of each cell in K readings, in DN: cells (K, rows, columns), NaN where there is none.
 
-    window: (K,), that of the measuring window in the same pictures.
+    window: (K,), that of the measuring window in the same pictures. smoothing: (K,), variance of a
+    cell over that of one rectified from the picture itself. blur: (K,), share of a cell's
+    difference from the mean of its two neighbours along x that it has lost.
     """
 
     cells: NDArray[np.float32]
     window: FloatArray
+    smoothing: FloatArray
+    blur: FloatArray
 
 
 class CellSource(Protocol):
     """Light of the cells of a run, from what it has kept.
 
-    without_dark: exposures in seconds of which the record has a mean alone.
+    without_dark: exposures in seconds of which the record has a mean alone. u_height: relative, of
+    a height that the cells show.
     """
 
     without_dark: set[float]
+    u_height: float
 
     def steps(self) -> set[int]:
         """Return the steps whose cells can be had."""
@@ -54,8 +63,13 @@ class CellSource(Protocol):
     def require(self, readings: Sequence[Reading]) -> None:
         """Raise `InputError` that names what is missing of these readings."""
 
-    def light(self, readings: Sequence[Reading], grid: CellGrid) -> CellLight:
-        """Return the light of the cells (K, rows, columns) in these readings, in DN."""
+    def search_grid(self) -> CellGrid:
+        """Return the cells in which the height of the surface is looked for."""
+
+    def light(
+        self, readings: Sequence[Reading], grid: CellGrid, height_mm: float = 0.0
+    ) -> CellLight:
+        """Return the light, in DN, of the cells (K, rows, columns) of a surface at a height."""
 
 
 class KeptCells:
@@ -66,8 +80,9 @@ class KeptCells:
 
     def __init__(self, record: Record, loaded: Loaded, grid: CellGrid) -> None:
         maps = loaded.protocol.maps
-        self._run, self._grid = record.folder, grid
+        self._run, self._grid, self._pinhole = record.folder, grid, Pinhole.of(loaded.rig)
         self.without_dark: set[float] = set()
+        self.u_height = _U_HEIGHT
         if maps is None or grid != CellGrid.of(loaded.protocol.sample, loaded.rig, maps.cell_mm):
             kept = "none" if maps is None else f"of {maps.cell_mm:g} mm"
             raise InputError(
@@ -83,13 +98,30 @@ class KeptCells:
     def require(self, readings: Sequence[Reading]) -> None:
         """Do nothing: only readings with cells are asked for."""
 
-    def light(self, readings: Sequence[Reading], grid: CellGrid) -> CellLight:
-        """Return the light of the cells (K, rows, columns), in DN, of a band of the rows."""
+    def search_grid(self) -> CellGrid:
+        """Return the cells that were gathered: there are no others."""
+        return self._grid
+
+    def light(
+        self, readings: Sequence[Reading], grid: CellGrid, height_mm: float = 0.0
+    ) -> CellLight:
+        """Return the light of the cells (K, rows, columns), in DN, of a band of the rows.
+
+        They were rectified for a surface on the axis, and are moved to the height.
+        """
         first = round(float(self._grid.y_mm[0] - grid.y_mm[0]) / grid.cell_mm)
-        found = [self._read(r.step) for r in readings]
         rows = slice(first, first + grid.rows)
-        cells = np.stack([values[1:].reshape(self._grid.rows, -1)[rows] for values in found])
-        return CellLight(cells, np.array([values[0] for values in found], dtype=np.float64))
+        cells = np.empty((len(readings), grid.rows, grid.columns), dtype=np.float32)
+        window = np.empty(len(readings))
+        for k, reading in enumerate(readings):
+            values = self._read(reading.step)
+            whole = values[1:].reshape(self._grid.rows, -1)
+            at = at_height(whole, reading.theta_r_deg, height_mm, self._grid, self._pinhole)
+            window[k], cells[k] = values[0], at[rows]
+        theta_r_deg = np.array([r.theta_r_deg for r in readings])
+        moved = smoothing(theta_r_deg, height_mm, grid.cell_mm)
+        # Twice what a smooth texture loses: means of cells hide the half of a sharp one.
+        return CellLight(cells, window, moved, 1 - moved)
 
     def _path(self, step: int) -> Path:
         return self._run / cells_name(step)
@@ -114,7 +146,7 @@ def cell_source(record: Record, loaded: Loaded, grid: CellGrid) -> CellSource:
     """Return the run's kept frames, or else its cells; raises `InputError` without either."""
     if loaded.protocol.maps is not None and not loaded.protocol.keep_frames:
         return KeptCells(record, loaded, grid)
-    return KeptFrames(record, loaded)
+    return KeptFrames(record, loaded, grid)
 
 
 class KeptFrames:
@@ -124,13 +156,15 @@ class KeptFrames:
     record has a mean alone.
     """
 
-    def __init__(self, record: Record, loaded: Loaded) -> None:
+    def __init__(self, record: Record, loaded: Loaded, grid: CellGrid) -> None:
+        self._grid = grid
         self._run, self._camera = record.folder, loaded.rig.camera
         self._pinhole, self._patch = Pinhole.of(loaded.rig), loaded.protocol.window
         self._names = _by_step(record)
         self._means = {exposure_s: mean for exposure_s, _, mean, _ in record.darks()}
         self._darks: dict[float, tuple[FloatImage | float, BoolArray | None]] = {}
         self.without_dark: set[float] = set()
+        self.u_height = 0.0
 
     def steps(self) -> set[int]:
         """Return the steps whose frames were kept."""
@@ -147,7 +181,17 @@ class KeptFrames:
                 f"missing: {', '.join(lost[:_SHOWN])}{more}: put them back into the run's folder"
             )
 
-    def light(self, readings: Sequence[Reading], grid: CellGrid) -> CellLight:
+    def search_grid(self) -> CellGrid:
+        """Return a grid of cells as small as the pixels, or of `_SEARCHED` along a side."""
+        grid, pixel_mm = self._grid, self._camera.field_width_mm / self._camera.width_px
+        side_mm = max(grid.rows, grid.columns) * grid.cell_mm
+        cell_mm = min(grid.cell_mm, max(pixel_mm, side_mm / _SEARCHED))
+        rows, columns = (int(n * grid.cell_mm / cell_mm) for n in (grid.rows, grid.columns))
+        return CellGrid(cell_mm, rows, columns)
+
+    def light(
+        self, readings: Sequence[Reading], grid: CellGrid, height_mm: float = 0.0
+    ) -> CellLight:
         """Return the light of the cells in these readings, whose darks are read first."""
         for exposure_s in {r.exposure_s for r in readings}:
             self._darks.setdefault(exposure_s, self._dark(exposure_s))
@@ -157,12 +201,12 @@ class KeptFrames:
         def read(k: int) -> None:
             light = self._light(readings[k])
             window[k] = window_dn(light, readings[k].theta_r_deg, self._pinhole, self._patch)
-            cells[k] = rectify(light, grid, self._pinhole, readings[k].theta_r_deg)
+            cells[k] = rectify(light, grid, self._pinhole, readings[k].theta_r_deg, height_mm)
 
         with ThreadPoolExecutor(_WORKERS) as pool:
             for _ in pool.map(read, range(len(readings))):
                 pass
-        return CellLight(cells, window)
+        return CellLight(cells, window, np.ones(len(readings)), np.zeros(len(readings)))
 
     def _light(self, reading: Reading) -> FloatImage:
         images = [self._image(name) for name in self._names[reading.step]]

@@ -104,13 +104,19 @@ class MeanCurve:
         the lamp's levels are those of the mean curve, and add its own u; and all values have an
         unknown factor, of which sigma depends by the light of two bounces.
         """
-        factor = self._u_factor() * MODELS[self.fit.model].brdf(self.geometry, **self.values)
-        errors = np.hstack([self.shared, height * self.by_height, factor[:, np.newaxis]])
-        shifts = response.inverse @ (errors * response.level[:, np.newaxis])
+        shifts = response.inverse @ (self.errors(height) * response.level[:, np.newaxis])
         u = np.sqrt(np.sum(shifts**2, axis=1))
         if self.relative:
             u = np.hypot(u, [self.fit.u.get(name) or 0.0 for name in self.values])
         return np.asarray(u)
+
+    def errors(self, height: float) -> FloatArray:
+        """Return the shifts (K, M) of the mean curve, in 1/sr, by one u of each shared error.
+
+        height: as in `u_shared`.
+        """
+        factor = self._u_factor() * MODELS[self.fit.model].brdf(self.geometry, **self.values)
+        return np.hstack([self.shared, height * self.by_height, factor[:, np.newaxis]])
 
     def _u_factor(self) -> float:
         """Return the relative u of the factor of relative values: the albedo may be any."""

@@ -6,16 +6,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.measure.rectify.cell_grid import CellGrid
-from acquisition.results.maps.cell_brdf import cell_data, in_own_light, places_of, usable
+from acquisition.results.maps.cell_brdf import (
+    cell_data,
+    in_own_light,
+    leave_out_edges,
+    places_of,
+    usable,
+)
 from acquisition.results.maps.kept_cells import CellSource, cell_source
 from acquisition.results.maps.mean_curve import MeanCurve
-from acquisition.results.maps.surface_height import (
-    Height,
-    find_height,
-    middle,
-)
+from acquisition.results.maps.surface_height import Height, find_height, searched_views
 from acquisition.results.maps.u_shared import UnknownHeight, u_shared
 from acquisition.results.reduction import Reduced, reduced_run, require_usable
 from analysis.sample_maps.block_fit import CellData, fit_blocks
@@ -24,7 +27,6 @@ from analysis.sample_maps.sample_map import SampleMap
 from instrument.config.load import Loaded
 from instrument.errors import InputError, NotDetermined
 from instrument.geometry import BoolArray, FloatArray
-from instrument.pinhole import Pinhole
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 
@@ -98,18 +100,17 @@ class _Mapping:
     ) -> None:
         self._frames, self._readings, self._curve = frames, readings, curve
         self._grid, self._loaded = grid, loaded
-        self._pinhole = Pinhole.of(loaded.rig)
         self._theta_r_deg = np.array([r.theta_r_deg for r in readings])
 
     def made(self, reduced: Reduced) -> SampleMap:
         """Return the map."""
-        bands = self._bands()
-        first = self._data(bands[0])
-        height = self._height(first, bands[0]) if len(bands) == 1 else self._height_of_middle()
+        height = self._height()
         tables, maps = self._tables(height), []
-        for number, band in enumerate(bands):
-            data = first if number == 0 else self._data(band)
-            data = in_own_light(data, self._readings, height, band, self._loaded.rig)
+        for band in self._bands():
+            light = self._frames.light(self._readings, band, height.mm)
+            data = cell_data(light, self._readings, self._curve, band, self._loaded)
+            data = in_own_light(data, self._readings, height, light.blur, self._loaded.rig)
+            data = self._with_shared(data, height)
             maps.append(fit_blocks(data, tables, self._nearest_mm()))
         whole = {name: np.concatenate([m[name] for m in maps]) for name in maps[0]}
         return self._as_map(whole, data, height, reduced)
@@ -129,24 +130,29 @@ class _Mapping:
         rows = max(1, _MOST_BYTES // per_row)
         return [self._grid.band(k, k + rows) for k in range(0, self._grid.rows, rows)]
 
-    def _data(self, grid: CellGrid) -> CellData:
-        light = self._frames.light(self._readings, grid)
-        return cell_data(light, self._readings, self._curve, grid, self._loaded)
+    def _with_shared(self, data: CellData, height: Height) -> CellData:
+        """Return the cells with the shifts by what they share, relative to their curves."""
+        errors = self._curve.errors(self._u_height(height))
+        brdf = np.abs(self._curve.brdf)[:, np.newaxis]
+        u_mm = min(height.u_mm, self._loaded.rig.u_placement_mm)
+        moved_mm = u_mm * np.tan(np.radians(self._theta_r_deg))
+        return replace(data, shared=errors / brdf, shared_mm=moved_mm)
 
-    def _height_of_middle(self) -> Height:
-        rows = middle(self._grid.rows)
-        band = self._grid.band(rows.start, rows.stop)
-        return self._height(self._data(band), band)
+    def _height(self) -> Height:
+        """Return the height of the surface, as its texture shows it in some of the readings."""
+        theta_r_deg, u_mm = self._theta_r_deg, self._loaded.rig.u_placement_mm
+        some = searched_views(theta_r_deg)
+        readings, grid = [self._readings[k] for k in some], self._frames.search_grid()
 
-    def _height(self, data: CellData, grid: CellGrid) -> Height:
-        rows, columns = middle(grid.rows), middle(grid.columns)
-        part = grid.band(rows.start, rows.stop)
-        part = replace(part, columns=len(range(*columns.indices(grid.columns))))
-        u_mm = self._loaded.rig.u_placement_mm
-        found = find_height(
-            data.brdf[:, rows, columns], self._theta_r_deg, part, self._pinhole, u_mm
-        )
-        return replace(found, u_mm=max(found.u_mm, _LEAST_U_MM))
+        def light(height_mm: float) -> NDArray[np.float32]:
+            found = self._frames.light(readings, grid, height_mm)
+            found.cells[...] /= found.window[:, np.newaxis, np.newaxis]
+            leave_out_edges(found.cells, readings, grid, self._loaded)
+            return found.cells
+
+        found = find_height(light, theta_r_deg[some], grid.cell_mm, u_mm)
+        u_mm = np.hypot(max(found.u_mm, _LEAST_U_MM), self._frames.u_height * found.mm)
+        return replace(found, u_mm=float(u_mm))
 
     def _u_shared(
         self, maps: dict[str, FloatArray], data: CellData, height: Height

@@ -7,20 +7,22 @@ shift. Where the sample has none, a shift changes nothing either.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.measure.rectify.cell_grid import CellGrid
-from instrument.geometry import FloatArray
+from instrument.geometry import FloatArray, IntArray
 from instrument.pinhole import Pinhole
 
-_ROUNDS, _STEP_MM = 5, 0.005  # a smaller change ends the search
+_ROUNDS, _STEP_MM = 6, 0.005  # a smaller change ends the search
+_FIRST, _LEAST_SEEN = 0.25, 0.1  # first height, of the placement; share of a shift that is seen
 _NEAR_DEG = 35.0  # views up to here show the texture at its place
-_MOST_CELLS = 160  # along a side, of the middle of the map
-_LARGEST_U, _MOST_U = 0.05, 8.0  # of the placement: u of a height, and a height
-_LEAST_CELLS, _SINGULAR = 100, 1e10
+_NEAR, _FAR = 3, 8  # pictures that are compared, of those and of the others
+_LARGEST_U, _MOST_U = 0.25, 8.0  # of the placement: u of a height, and a height
+_LEAST_CELLS, _LEAST_PICTURES, _SINGULAR = 100, 3, 1e10
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,44 +33,50 @@ class Height:
     u_mm: float
 
 
-def middle(size: int) -> slice:
-    """Return the part of a side, in cells, that the search uses."""
-    start = max((size - _MOST_CELLS) // 2, 0)
-    return slice(start, start + _MOST_CELLS)
+def searched_views(theta_r_deg: FloatArray) -> IntArray:
+    """Return the numbers of the views to compare, out of (K,) in degrees, near ones first."""
+    by_size = np.argsort(np.abs(theta_r_deg), kind="stable")
+    near = np.abs(theta_r_deg) <= _NEAR_DEG
+    others = np.flatnonzero(~near)[np.argsort(theta_r_deg[~near], kind="stable")]
+    even = np.linspace(0, others.size - 1, min(_FAR, others.size)).round().astype(np.int64)
+    return np.concatenate([by_size[: min(_NEAR, int(near.sum()))], others[even]])
 
 
 def find_height(
-    brdf: NDArray[np.float32],
+    light: Callable[[float], NDArray[np.float32]],
     theta_r_deg: FloatArray,
-    grid: CellGrid,
-    pinhole: Pinhole,
+    cell_mm: float,
     u_placement_mm: float,
 ) -> Height:
-    """Return the height from BRDF (K, rows, columns) in 1/sr at views (K,), in degrees.
+    """Return the height that views (K,), in degrees, show.
 
-    Not known where the pictures tell it no better than a part of the rig's u of placement.
-    Each picture is compared with the mean of those near the normal, slow changes apart.
+    light: returns the light of each cell, (K, rows, columns) and of about one size in all views, of
+    a surface at a height in mm. Not known where the pictures tell it no better than a part of the
+    rig's u of placement. Each picture is compared with the mean of those near the normal, slow
+    changes apart.
     """
     near = np.abs(theta_r_deg) <= _NEAR_DEG
-    if near.sum() < 1 or near.all() or min(brdf.shape[1:]) < 5 or not u_placement_mm:
+    if not near.any() or near.all() or not u_placement_mm:
         return Height(0.0, np.inf)
-    height, u = 0.0, np.inf
+    tangent = np.tan(np.radians(theta_r_deg))
+
+    def missing(height_mm: float) -> tuple[float, float]:
+        return _step(light(height_mm), near, tangent, cell_mm)
+
+    before, (last, u) = 0.0, missing(0.0)
+    height = float(np.copysign(max(abs(last), _FIRST * u_placement_mm), last))
     for _ in range(_ROUNDS):
-        seen = np.stack(
-            [
-                at_height(image, theta, height, grid, pinhole)
-                for image, theta in zip(brdf, theta_r_deg.tolist(), strict=True)
-            ]
-        )
-        step, u = _step(seen, near, np.tan(np.radians(theta_r_deg)), grid.cell_mm)
-        if not np.isfinite(step) or u > _LARGEST_U * u_placement_mm:
-            return Height(0.0, np.inf)
-        height += step
-        if abs(height) > _MOST_U * u_placement_mm:
-            return Height(0.0, np.inf)
-        if abs(step) < _STEP_MM:
+        if not abs(height) <= _MOST_U * u_placement_mm:
             break
-    return Height(height, u)
+        step, u = missing(height)
+        seen = (last - step) / (height - before)  # of a shift: edges show more, noise hides some
+        if not seen > _LEAST_SEEN or u > _LARGEST_U * u_placement_mm * seen:
+            break
+        before, last = height, step
+        height += step / seen
+        if abs(height - before) < _STEP_MM:
+            return Height(height, u / seen)
+    return Height(0.0, np.inf)
 
 
 def at_height(
@@ -120,6 +128,24 @@ def _step(
 ) -> tuple[float, float]:
     """Return the change of the height in mm that suits the pictures best, and its u.
 
+    The u is that of noise, or of the scatter of the pictures' own heights where that is larger:
+    what else differs between pictures, such as light that changes fast over the sample.
+    """
+    found = [own for own in _of_pictures(seen, near, cell_mm) if own[2] > 0]
+    if len(found) < _LEAST_PICTURES:
+        return np.nan, np.inf
+    number, shift, information = np.array(found).T
+    t = tangent[number.astype(np.int64)]
+    step = float(np.sum(information * t * shift) / np.sum(information * t * t))
+    chi2 = float(np.sum(information * (shift - step * t) ** 2)) / (len(found) - 1)
+    return step, float(np.sqrt(max(chi2, 1.0) / np.sum(information * t * t)))
+
+
+def _of_pictures(
+    seen: NDArray[np.float32], near: NDArray[np.bool_], cell_mm: float
+) -> Iterator[tuple[int, float, float]]:
+    """Yield number, shift in mm and its information in 1/mm^2 of each picture that has texture.
+
     Each picture is taken as the mean of the near ones, times a contrast, shifted, and a surface of
     second order: light and angles that change slowly over the sample.
     """
@@ -127,27 +153,22 @@ def _step(
     mean = np.where(known, seen[near].mean(axis=0), np.nan).astype(np.float64)
     by_mm = np.gradient(mean, cell_mm, axis=1)
     slow = _slow_surfaces(mean.shape)
-    top = bottom = 0.0
-    for image, t in zip(seen, tangent.tolist(), strict=True):
+    for number, image in enumerate(seen):
         used = np.isfinite(image) & np.isfinite(by_mm)
         if np.count_nonzero(used) < _LEAST_CELLS:
             continue
         parts = np.column_stack([*(s[used] for s in slow), mean[used], by_mm[used]])
-        parts /= np.maximum(np.linalg.norm(parts, axis=0), 1e-30)
-        scale = max(float(np.linalg.norm(by_mm[used])), 1e-30)
+        norms = np.maximum(np.linalg.norm(parts, axis=0), 1e-30)
+        parts /= norms
         normal = parts.T @ parts
         if np.linalg.cond(normal) > _SINGULAR:
             continue
-        contrast, shift = np.linalg.solve(normal, parts.T @ image[used])[-2:]
-        contrast /= max(float(np.linalg.norm(mean[used])), 1e-30)
-        left = image[used] - parts @ np.linalg.solve(normal, parts.T @ image[used])
-        variance = float(np.mean(left**2)) * float(np.linalg.inv(normal)[-1, -1]) / scale**2
-        if contrast <= 0 or variance <= 0:
-            continue
-        information = contrast**2 / variance
-        top += information * t * float(shift) / scale / float(contrast)
-        bottom += information * t * t
-    return (top / bottom, float(bottom**-0.5)) if bottom > 0 else (np.nan, np.inf)
+        solved = np.linalg.solve(normal, parts.T @ image[used])
+        contrast, moved = (solved / norms)[-2:].tolist()
+        rest = float(np.mean((image[used] - parts @ solved) ** 2))
+        variance = rest * float(np.linalg.inv(normal)[-1, -1]) / norms[-1] ** 2
+        if contrast > 0 and variance > 0:
+            yield number, moved / contrast, contrast**2 / variance
 
 
 def _slow_surfaces(shape: tuple[int, ...]) -> list[FloatArray]:
