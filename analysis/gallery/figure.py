@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from analysis.report.style import NARROW_IN, Draw, Drawing, short_number
@@ -48,6 +48,10 @@ class PaperFigure:
     caption: str
     panels: tuple[Panel, ...]
     checks: tuple[Check, ...]
+
+    def renumbered(self, number: str, caption: str) -> PaperFigure:
+        """Return the same figure as it stands in another paper, with that paper's equations."""
+        return replace(self, number=number, caption=caption)
 
 
 Maker = Callable[[], PaperFigure]

@@ -9,6 +9,7 @@ from html import unescape
 from analysis.gallery.figure import Check, Paper, PaperFigure
 from analysis.report.style import CSS, embedded_svg, escaped, html_page, row_html, table_html
 
+_LONG = 6  # panels, which with their heading fill a printed page
 _TITLE = "The papers’ figures, drawn by the models"
 _CSS = """
 .panels { display: grid; grid-template-columns: repeat(2, minmax(0, 1fr)); gap: 14px 32px; }
@@ -35,9 +36,14 @@ h3 a { color: inherit; text-decoration: none; }
   .panels .picture > svg { background: #fff; }
 }
 @media print {
-  figure.panels { break-inside: auto; gap: 8px 20px; }
-  figcaption li { break-inside: avoid; }
-  h3 { break-after: avoid; }
+  /* A grid parts between rows only; one of few panels stays with its caption and its heading. */
+  .panels { gap: 8px 20px; }
+  .drawn { break-inside: avoid; }
+  .drawn.long, .drawn.long .panels { break-inside: auto; }
+  .panels figcaption { break-inside: auto; break-before: auto; }
+  .panels figcaption { font-size: 8.5pt; line-height: 1.35; }
+  figcaption li { margin-bottom: 3px; }
+  figcaption li, h2, h3 { break-inside: avoid; }
 }
 """
 
@@ -94,11 +100,12 @@ def _figure_html(paper: Paper, figure: PaperFigure) -> str:
     ]
     caption = f"<figcaption>{figure.caption}<ul>{''.join(map(_check, figure.checks))}</ul>"
     kind = "panels odd" if len(panels) % 2 else "panels"
+    length = "drawn long" if len(panels) > _LONG else "drawn"
     return (
-        f'<h3 id="{name}"><a href="#{name}">{paper.key}, Figure {figure.number}.</a> '
-        f'{figure.title}</h3>\n<figure class="{kind}">\n'
+        f'<section class="{length}">\n<h3 id="{name}"><a href="#{name}">{paper.key}, '
+        f'Figure {figure.number}.</a> {figure.title}</h3>\n<figure class="{kind}">\n'
         + "\n".join(panels)
-        + f"\n{caption}</figcaption>\n</figure>"
+        + f"\n{caption}</figcaption>\n</figure>\n</section>"
     )
 
 

@@ -169,7 +169,8 @@ def _spike(angle: FloatArray) -> FloatArray:
     return whole * (2 * math.pi * math.radians(_SPIKE_WIDTH) ** 2)
 
 
-def _component_panel(moving_camera: bool) -> Panel:
+def component_panel(*, moving_camera: bool) -> Panel:
+    """Polar panel of the three components, for a moving camera or a moving source."""
     angle = np.linspace(-90.0, 85.0, 701)
     fine = np.linspace(_ANGLE - 3, _ANGLE + 3, 121)
     diffuse, lobe = _components(moving_camera, angle)
@@ -196,7 +197,7 @@ def figure_16() -> PaperFigure:
             "direction of the camera for a fixed source (at 40°, left). The strengths are free in "
             "the paper; the delta of the spike is here a Gaussian 0.6° wide, as the paper allows."
         ),
-        panels=(_component_panel(True),),
+        panels=(component_panel(moving_camera=True),),
         checks=(
             Check(
                 "the specular lobe has its peak beyond the mirror direction at large roughness",
@@ -232,7 +233,7 @@ def figure_17() -> PaperFigure:
             "The terms of equation (62) in the direction of the source for a fixed camera (at 40°, "
             "left)."
         ),
-        panels=(_component_panel(False),),
+        panels=(component_panel(moving_camera=False),),
         checks=(
             Check(
                 "the diffuse component is proportional to the irradiance, cos θ<sub>i</sub>",

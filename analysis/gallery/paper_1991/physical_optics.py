@@ -25,10 +25,13 @@ _SLOPES = (0.01, 0.02, 0.066, 0.1, 0.2)  # sigma_h / T of Fig. 10
 _ROUGH = 1.5  # sigma_h / lambda of Fig. 10: no spike is left
 
 
-def _spike_and_lobe(
+def spike_and_lobe(
     sigma_h: float, theta_i: float, theta_r: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Radiance of the spike and of the lobe, over that of a mirror in the mirror direction."""
+    """Radiance (N,) of the spike and of the lobe, relative to a mirror in the mirror direction.
+
+    At view angles (N,) in degrees, + on the mirror side; `sigma_h` in wavelengths.
+    """
     at = towards_mirror(theta_i, theta_r)
     patch = patch_of_pixel(_PIXEL, 1.0, 0.0, at.theta_r)
     lamp = np.cos(at.theta_i) / _PIXEL**2
@@ -56,7 +59,7 @@ def _diagram(letter: str, sigma_h: float) -> Panel:
 
 def _close_up() -> Panel:
     x = np.linspace(37.0, 43.0, 601)
-    line = Line(x, _spike_and_lobe(_HEIGHTS[0], 40.0, x)[0], "θᵢ 40°", 2)
+    line = Line(x, spike_and_lobe(_HEIGHTS[0], 40.0, x)[0], "θᵢ 40°", 2)
     return chart("(b) one spike of (a), rescaled", [line], Axis(MIRROR_SIDE), Axis("radiance"))
 
 
@@ -86,10 +89,10 @@ def figure_9() -> PaperFigure:
 
 def _mirror_checks() -> tuple[Check, Check]:
     theta = np.array([0.0, 20.0, 40.0, 60.0, 75.0])
-    peaks = np.array([float(_spike_and_lobe(0.002, t, np.array([t]))[0][0]) for t in theta])
+    peaks = np.array([float(spike_and_lobe(0.002, t, np.array([t]))[0][0]) for t in theta])
     # The square of a sinc: zero where v_x X = pi, with the patch elongated by 1/cos(theta_r).
     x = np.linspace(40.0, 43.0, 30001)
-    y = _spike_and_lobe(0.002, 40.0, x)[0]
+    y = spike_and_lobe(0.002, 40.0, x)[0]
     first_zero = float(x[np.flatnonzero((y[1:-1] < y[:-2]) & (y[1:-1] < y[2:]))[0] + 1])
     sine, tangent = np.sin(np.radians(first_zero)), np.cos(np.radians(first_zero))
     turns = float((sine - np.sin(np.radians(40.0))) * _PIXEL / tangent)
@@ -110,7 +113,7 @@ def _mirror_checks() -> tuple[Check, Check]:
 
 def _fading_spike() -> Check:
     found = {
-        (s, t): float(_spike_and_lobe(s, t, np.array([t]))[0][0])
+        (s, t): float(spike_and_lobe(s, t, np.array([t]))[0][0])
         for s in (0.025, 0.05, 0.1)
         for t in (0.0, 75.0)
     }
@@ -129,7 +132,7 @@ def _leading_lobe() -> Check:
     theta = np.array([0.0, 20.0, 40.0])
     ratios = []
     for sigma_h in (0.33, 0.5):
-        parts = [_spike_and_lobe(sigma_h, t, np.array([t])) for t in theta]
+        parts = [spike_and_lobe(sigma_h, t, np.array([t])) for t in theta]
         ratios.append(max(float(spike[0] / lobe[0]) for spike, lobe in parts))
     return Check(
         "at σ<sub>h</sub>/λ = 0.33 and 0.5 the spike has faded and the lobe dominates",
@@ -140,7 +143,7 @@ def _leading_lobe() -> Check:
 
 
 def _no_spike() -> Check:
-    spike, lobe = _spike_and_lobe(1.5, 75.0, np.array([75.0]))
+    spike, lobe = spike_and_lobe(1.5, 75.0, np.array([75.0]))
     ratio = float(spike[0] / lobe[0])
     return Check(
         "no spike is left above σ<sub>h</sub>/λ = 1.5 unless the incidence is near grazing",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.models.specular.torrance_sparrow import slope_density
 from analysis.report.style import BAND, GREY, INK, style_of
 from instrument.geometry import FloatArray
 
@@ -20,7 +22,7 @@ def profile_sketch(axes: Axes, sigma_deg: float, seed: int, count: int = 7) -> N
     """Cross-section of cavities with slopes drawn at random from (32)."""
     rng = np.random.default_rng(seed)
     theta = np.radians(np.linspace(0.25, 75.0, 300))
-    density = np.exp(-0.5 * np.square(theta / np.radians(sigma_deg))) * np.sin(theta)
+    density = slope_density(theta, math.radians(sigma_deg)) * np.sin(theta)
     slopes = np.interp(rng.uniform(size=count), np.cumsum(density) / density.sum(), theta)
     x, y = [0.0], [0.0]
     for slope in slopes:

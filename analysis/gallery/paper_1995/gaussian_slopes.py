@@ -77,7 +77,7 @@ def three_sections() -> tuple[Check, ...]:
     return (
         Check(
             "the increase towards the lamp is cut off exactly at θ<sub>r</sub> = θ<sub>i</sub>, at "
-            "any roughness (section 4.3)",
+            "any roughness",
             f"bend at {kinks[0]:.1f}°, {kinks[2]:.1f}° and {kinks[4]:.1f}° for σ = 10°, 30° and "
             "60° with θ<sub>i</sub> = 75°; beyond it the slope, for 30°, is "
             f"{after / before:.2f} of that before",

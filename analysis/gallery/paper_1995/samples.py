@@ -99,7 +99,7 @@ def figure_17() -> PaperFigure:
 
 def figure_18() -> PaperFigure:
     """Sample C."""
-    return matt_figure("18", "White sand (sample C)", 35.0, 0.80)
+    return matt_figure("18", "White sand (sample C; B in 1994)", 35.0, 0.80)
 
 
 def figure_19() -> PaperFigure:
@@ -187,22 +187,22 @@ def _cut_off(glossy: Brdf) -> Check:
 
 
 def _wide_lobe() -> Check:
-    x = np.linspace(-89.0, 0.0, 891)
+    x = np.linspace(-89.0, 85.0, 1741)
     lobes = [
         radiance(partial(MODELS["torrance_sparrow"].brdf, ks=1.0, sigma_deg=s), 45.0, x)
-        for s in (5.0, 10.0, 20.0)
+        for s in (2.0, 5.0, 10.0)
     ]
     peaks = [peak_at(x, y) for y in lobes]
-    above = [float(np.mean(y > np.max(y) / 2)) * 89 for y in lobes]
+    above = [float(np.mean(y > np.max(y) / 2)) * 174 for y in lobes]
     return Check(
         "the lobe (37) has its peak close to the mirror direction and widens with σ",
         "at incidence 45° the lobe alone has its peak at "
         + ", ".join(f"{p:.0f}°" for p in peaks).replace("-", "−")
         + " and is above half of it over "
         + ", ".join(f"{a:.0f}°" for a in above)
-        + ", for σ = 5°, 10°, 20°",
-        rises(np.array(above)) and abs(peaks[0] + 45) < 5,
-        "A lobe as wide as those of these samples has its peak far beyond the mirror direction.",
+        + ", for σ = 2°, 5°, 10°",
+        rises(np.array(above)) and abs(peaks[1] + 45) < 5,
+        "A lobe as wide as this sample’s has its peak far beyond the mirror direction.",
     )
 
 

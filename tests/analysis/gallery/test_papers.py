@@ -12,7 +12,9 @@ from analysis.gallery.papers import PAPERS
 # Figures without a photograph, a measurement alone, or a sketch that only defines symbols.
 FIGURES = {
     "1991": [*range(9, 18)],
-    "1995": [*range(5, 15), *range(16, 23)],
+    "1994": [5, 6, 8, 9, *range(12, 16)],
+    "1995": [*range(5, 15), *range(16, 23), 24, 25],
+    "1998": [1, *range(3, 17)],
 }
 # Statements of the papers that the models contradict, by the beginning of their words.
 CONTRADICTED = {
@@ -20,7 +22,9 @@ CONTRADICTED = {
     ("1991", "12"): ["and faster than"],
     ("1995", "13"): ["also interreflection (34)"],
     ("1995", "14"): ["it is reasonably accurate"],
-    ("1995", "20"): ["the lobe (37) has its peak"],
+    ("1995", "25"): ["the map becomes linear only"],
+    ("1998", "13"): ["the map becomes linear only"],
+    ("1998", "14"): ["high roughness makes the three faces"],
 }
 
 
