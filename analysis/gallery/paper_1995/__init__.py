@@ -1,7 +1,7 @@
 """Figures of Oren and Nayar 1995: from V-cavities to pictures of rough surfaces."""
 
 from analysis.gallery.figure import Paper
-from analysis.gallery.paper_1995 import cavities, gaussian_slopes, samples, vase, vision
+from analysis.gallery.paper_1995 import cavities, gaussian_slopes, samples, stereo, vase, vision
 
 PAPER = Paper(
     key="1995",
@@ -29,6 +29,8 @@ PAPER = Paper(
         samples.figure_22,
         vase.figure_24,
         vision.figure_25,
+        stereo.figure_26,
+        stereo.figure_27,
     ),
     left_out=(
         "Figures 1 and 23 (photographs), 2 and 4 (sketches that define symbols), 3 (spheres, which "

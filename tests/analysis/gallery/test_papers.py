@@ -13,7 +13,7 @@ from analysis.gallery.papers import PAPERS
 FIGURES = {
     "1991": [*range(9, 18)],
     "1994": [5, 6, 8, 9, *range(12, 16)],
-    "1995": [*range(5, 15), *range(16, 23), 24, 25],
+    "1995": [*range(5, 15), *range(16, 23), *range(24, 28)],
     "1998": [1, *range(3, 17)],
 }
 # Statements of the papers that the models contradict, by the beginning of their words.
