@@ -292,7 +292,8 @@ class SimulatedSample(Section):
 
     `method` of computing its reflectance; auto: the cheapest that is accurate enough for the image.
     `mottling`: relative standard deviation of the albedo over the surface, in patches of
-    `mottling_size_mm`. `variation`: places with other parameters.
+    `mottling_size_mm`; its logarithm is normally distributed, so that no place reflects less than
+    nothing. `variation`: places with other parameters.
     """
 
     model: Name

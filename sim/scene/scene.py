@@ -57,12 +57,29 @@ _UNSET_DEG = {"theta_i": 30.0, "dphi": 0.0, "theta_r": 0.0}
 _NODES = -(0.6**0.5), 0.0, 0.6**0.5  # Gauss-Legendre, of an exposure from -1 to 1
 NODE_WEIGHTS = 5 / 18, 8 / 18, 5 / 18
 BOARD_PLACES = get_args(BoardPlace)
+_ROUNDS = 8  # of the search for a standard deviation: exact to 1e-6 at 0.3
+_LINEAR = 1e-6  # standard deviation below which a logarithm is as good as linear
 PAPER = 0.8  # reflectance of white paper (assumed)
 
 
 def stream_key(name: str) -> int:
     """Return a stable integer for `name`, to key a random stream with."""
     return zlib.crc32(name.encode())
+
+
+def log_normal(normal: FloatArray, deviation: float) -> FloatArray:
+    """Return relative variation of mean 0 and standard deviation `deviation`, nowhere below -1.
+
+    Its logarithm plus 1 is proportional to `normal` (...), of mean 0 and standard deviation 1.
+    """
+    if deviation < _LINEAR:
+        return deviation * normal
+    spread = np.sqrt(np.log1p(deviation**2))  # exact for infinitely many normal deviates
+    for _ in range(_ROUNDS):
+        factor = np.exp(spread * normal)
+        factor /= factor.mean()
+        spread *= deviation / factor.std()
+    return np.asarray(factor - 1)
 
 
 @dataclass(slots=True)
@@ -318,6 +335,4 @@ class Scene:
         """White noise smoothed to patches of `mottling_size_mm` (three grid points)."""
         white = self.random(stream_key("mottling")).standard_normal((rows, columns))
         smooth = cv2.GaussianBlur(white, (0, 0), 1.5, borderType=cv2.BORDER_REFLECT)
-        smooth -= smooth.mean()
-        texture: FloatArray = smooth * (self.sample.mottling / smooth.std())
-        return texture
+        return log_normal((smooth - smooth.mean()) / smooth.std(), self.sample.mottling)
