@@ -103,10 +103,14 @@ def _figure_html(paper: Paper, figure: PaperFigure) -> str:
     length = "drawn long" if len(panels) > _LONG else "drawn"
     return (
         f'<section class="{length}">\n<h3 id="{name}"><a href="#{name}">{paper.key}, '
-        f'Figure {figure.number}.</a> {figure.title}</h3>\n<figure class="{kind}">\n'
+        f'{_numbered(figure.number)}.</a> {figure.title}</h3>\n<figure class="{kind}">\n'
         + "\n".join(panels)
         + f"\n{caption}</figcaption>\n</figure>\n</section>"
     )
+
+
+def _numbered(number: str) -> str:
+    return number.replace("§", "section ") if number.startswith("§") else f"Figure {number}"
 
 
 def plain_text(words: str) -> str:
@@ -116,7 +120,7 @@ def plain_text(words: str) -> str:
 
 def _labelled(svg: str, paper: Paper, figure: PaperFigure, title: str) -> str:
     """The SVG with a label for readers of a screen."""
-    words = escaped(plain_text(f"{paper.key}, figure {figure.number}: {title or figure.title}"))
+    words = escaped(plain_text(f"{paper.key}, {_numbered(figure.number)}: {title or figure.title}"))
     return svg.replace("<svg ", f'<svg role="img" aria-label="{words}" ', 1)
 
 

@@ -53,10 +53,12 @@ def contours(
     labels: tuple[str, str] = ("", ""),
     *,
     outline: bool = False,
+    labelled: bool = False,
 ) -> Panel:
     """Panel of lines of equal brightness of values (Y, X) over x and y, in their units.
 
     `labels` of both axes: none for a picture. `outline`: the unit circle is drawn around.
+    `labelled`: each line has its value in percent.
     """
 
     def draw(canvas: Figure) -> None:
@@ -64,7 +66,9 @@ def contours(
         axes = canvas.add_subplot(
             canvas.add_gridspec(1, 1, **margins(canvas, left, 0.15, 0.1, bottom))[0]
         )
-        axes.contour(x, y, values, levels=levels, colors=INK, linewidths=1.0)
+        drawn = axes.contour(x, y, values, levels=levels, colors=INK, linewidths=1.0)
+        if labelled:
+            axes.clabel(drawn, fmt=lambda level: f"{100 * level:g} %", fontsize=8.5)
         axes.set_aspect("equal")
         if labels[0]:
             axes.set_xlabel(labels[0])

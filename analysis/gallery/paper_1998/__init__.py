@@ -1,7 +1,7 @@
 """Figures of Wolff, Nayar and Oren 1998: smooth and rough surfaces compared."""
 
 from analysis.gallery.figure import Paper
-from analysis.gallery.paper_1998 import cylinders, plane, roughness, spheres
+from analysis.gallery.paper_1998 import combined, cylinders, plane, roughness, spheres
 
 PAPER = Paper(
     key="1998",
@@ -22,6 +22,7 @@ PAPER = Paper(
         spheres.figure_14,
         spheres.figure_15,
         roughness.figure_16,
+        combined.section_4,
     ),
     left_out=(
         "Figure 2, a sketch that defines symbols; of the others photographs and measured points."

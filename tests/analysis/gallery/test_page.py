@@ -75,7 +75,7 @@ def test_the_same_models_give_the_same_page() -> None:
 
 def test_words_for_a_reader_of_a_screen_have_no_marks() -> None:
     page, _ = gallery_html([PAPER])
-    assert 'aria-label="2000, figure 7: (a) θr &lt; 90°"' in page
+    assert 'aria-label="2000, Figure 7: (a) θr &lt; 90°"' in page
 
 
 @pytest.mark.slow
