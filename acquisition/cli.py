@@ -19,7 +19,7 @@ from acquisition.calibrate_cli import calibrate
 from acquisition.cli_parts import Commands, Json, ProtocolFile, RigFile, RigOnly, RunFolder
 from acquisition.gallery_cli import gallery
 from acquisition.new_cli import new
-from acquisition.outcomes_cli import compare, export, map_, runs
+from acquisition.outcomes_cli import compare, export, map_, runs, show
 from acquisition.plan_cli import plan
 from acquisition.terminal import stop_signals
 from acquisition.terminal.streams import lasting_streams
@@ -253,7 +253,7 @@ def report(
 
 
 app.command("map")(map_)
-for command in (export, compare, runs, gallery):
+for command in (export, compare, runs, show, gallery):
     app.command()(command)
 
 

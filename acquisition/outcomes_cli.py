@@ -1,4 +1,4 @@
-"""Commands about runs that have been measured: export, compare, runs, map."""
+"""Commands about runs that have been measured: export, compare, runs, map, show."""
 
 from __future__ import annotations
 
@@ -91,3 +91,42 @@ def map_(
     from acquisition.commands.outcomes.map import map_run
 
     map_run(folder, cell_mm, model, nexus=nexus, as_json=json)
+
+
+def show(
+    source: Annotated[
+        str,
+        typer.Argument(
+            help="A run's folder, a fit.json, a table, or a model: oren_nayar:sigma_deg=40."
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", help="Page to write (.html), or the pictures alone (.png)."),
+    ] = Path("show.html"),
+    lamp: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Lamp at THETA or THETA,PHI degrees: from the viewer, and azimuth (0 right, 90 "
+            "above). May be repeated."
+        ),
+    ] = None,
+    size_px: Annotated[int, typer.Option(help="Width of a picture in pixels.")] = 200,
+    noise: Annotated[
+        str | None,
+        typer.Option(
+            help="Relative u of the brightest pixel (0.5% or 0.005). Default: that of the run's "
+            "camera, else 0.5%."
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Show a material on a sphere, a vase, a cylinder and a cube, beside Lambert's law.
+
+    The page has brightness across the vase, isophotes, reflectance maps and lobes, and tells what
+    Lambert's law would cost in normals and depth.
+    """
+    from acquisition.commands.outcomes.show import Asked, show_material
+
+    asked = Asked(page=out, lamps=lamp or (), size_px=size_px, noise=noise)
+    show_material(source, asked, as_json=json)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from acquisition.commands.fit_status import no_fit_reported, print_json, require_result
 from acquisition.commands.outcomes.new_folder import require_new_folder, write_files
+from acquisition.commands.outcomes.relative_u import parse_relative_u
 from acquisition.commands.views import parameter_lines
 from acquisition.results.model_check import check_model
 from acquisition.results.sources import Source, Wanted, read_source
@@ -21,8 +22,6 @@ from analysis.choice.fit_json import no_fit_json, to_json
 from analysis.choice.ladder import METHODS, MethodOfFit, method_named
 from analysis.fit.fit import FitResult
 from instrument.errors import InputError, NotDetermined
-from instrument.text.quoting import printable
-from instrument.text.text_file import parse_number
 
 _MOST_ROWS = 12  # of the table of candidates
 
@@ -122,17 +121,7 @@ def _method(method: str, models: str | None) -> MethodOfFit:
 
 def parse_u_shared(text: str | None) -> float | None:
     """Relative u of an error that all values share: `0.5%`, or 0.005 as a plain number."""
-    if text is None:
-        return None
-    allowed = "allowed: more than 0 and less than 50 %, as 0.5% or 0.005"
-    number, percent = text.strip().removesuffix("%"), text.strip().endswith("%")
-    try:
-        u = parse_number(number) / (100 if percent else 1)
-    except ValueError as error:
-        raise InputError(f"--u-shared: {error}; {allowed}") from None
-    if not 0 < u < 0.5:
-        raise InputError(f"--u-shared: {printable(text)}; {allowed}")
-    return u
+    return None if text is None else parse_relative_u(text, "--u-shared")
 
 
 def _print(source: Source, choice: Choice) -> None:

@@ -47,8 +47,8 @@ def assumed_sample(like: str | None, loaded: Loaded) -> AssumedSample:
         return _of_protocol(loaded)
     path = Path(like)
     if path.is_dir() or path.suffix == ".json":
-        return _of_fit(path / _FIT if path.is_dir() else path)
-    return _of_text(like)
+        return sample_of_fit(path, "--like")
+    return sample_of_text(like, "--like")
 
 
 def _of_protocol(loaded: Loaded) -> AssumedSample:
@@ -61,7 +61,12 @@ def _of_protocol(loaded: Loaded) -> AssumedSample:
     return _sample(sample.model, sample.parameters, "simulated_sample of the protocol")
 
 
-def _of_text(like: str) -> AssumedSample:
+def sample_of_text(like: str, option: str, *, defaults: bool = False) -> AssumedSample:
+    """Return the sample that a text MODEL:NAME=VALUE,NAME=VALUE describes.
+
+    option: opens the message of an error. defaults: parameters may be left out. Raises `InputError`
+    for another text.
+    """
     name, _, rest = like.partition(":")
     values: dict[str, float] = {}
     for part in filter(None, rest.split(",")):
@@ -71,25 +76,31 @@ def _of_text(like: str) -> AssumedSample:
         except ValueError:
             equals = ""
         if not equals:
-            raise InputError(f"--like: {printable(part)}; allowed: NAME=NUMBER, as in {_FORM}")
+            raise InputError(f"{option}: {printable(part)}; allowed: NAME=NUMBER, as in {_FORM}")
+    if defaults and check_model(name, None) is None:
+        values = {**{p.name: p.default for p in MODELS[name].parameters}, **values}
     wrong = check_model(name, values)
     if wrong is not None:
-        raise InputError(f"--like {printable(like)}: {wrong}; the form is {_FORM}")
-    return _sample(name, values, "--like")
+        raise InputError(f"{option} {printable(like)}: {wrong}; the form is {_FORM}")
+    return _sample(name, values, option)
 
 
-def _of_fit(path: Path) -> AssumedSample:
-    """Return the chosen model of a fit."""
+def sample_of_fit(path: Path, option: str) -> AssumedSample:
+    """Return the chosen model of a fit: of the folder of a run, or of a fit.json.
+
+    option: opens the message of an error. Raises `InputError` where there is none.
+    """
+    path = path / _FIT if path.is_dir() else path
     try:
         data = json.loads(read_file(path, _MOST_BYTES))
         chosen = data["chosen"]
         found = next(c for c in data["candidates"] if c["model"] == chosen)
         values = {str(k): _number(v["value"]) for k, v in found["parameters"].items()}
     except OSError as error:
-        raise InputError(f"--like: {path}: cannot be read ({error.strerror})") from None
+        raise InputError(f"{option}: {path}: cannot be read ({error.strerror})") from None
     except (ValueError, KeyError, TypeError, AttributeError, StopIteration):
         raise InputError(
-            f"--like: {path}: holds no chosen model; allowed: a fit.json of gonio run, report or "
+            f"{option}: {path}: holds no chosen model; allowed: a fit.json of gonio run, report or "
             "fit, whose fit has found one"
         ) from None
     name = str(chosen)
@@ -97,7 +108,7 @@ def _of_fit(path: Path) -> AssumedSample:
     values = {key: value for key, value in values.items() if key in known}  # no factor of its own
     wrong = check_model(name, values)
     if wrong is not None:
-        raise InputError(f"--like: {path}: {printable(wrong)}")
+        raise InputError(f"{option}: {path}: {printable(wrong)}")
     return _sample(name, values, printable(str(path)))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from acquisition.results.facts.chosen_geometries import reasons
 from acquisition.results.facts.input_files import calibration_rows, file_rows
 from acquisition.results.facts.lamp_levels import lamp_levels
-from acquisition.results.facts.rendered_material import pixel_noise, rendered_material
+from acquisition.results.facts.rendered_material import camera_noise, rendered_material
 from acquisition.results.fitting import Fitted
 from acquisition.results.reduction import Reduced
 from acquisition.results.summary import budget, parameters_of, sources_of
@@ -64,7 +64,7 @@ def report_data(
         chosen_for=_chosen_for(reduced, record),
         lamp=lamp_levels(reduced.drifts, record.readings()),
         previews=tuple(record.previews()),
-        rendered=rendered_material(fitted.chosen, _noise(loaded)),
+        rendered=rendered_material(fitted.chosen, camera_noise(loaded)),
         rig=(*_rig_rows(loaded.rig), *_tile_rows(protocol.references.white_tile)),
         devices=tuple(record.devices().items()),
         calibrations=calibration_rows(loaded.rig),
@@ -79,12 +79,6 @@ def _chosen_for(reduced: Reduced, record: Record) -> tuple[str, ...]:
     """Return what each point was measured for; nothing for a scan that chose none."""
     own = reasons(record)
     return tuple(own.get(point.step, "not known") for point in reduced.points) if own else ()
-
-
-def _noise(loaded: Loaded) -> float:
-    """Relative u of a pixel of the rig's camera, in the frames of one point."""
-    protocol = loaded.protocol
-    return pixel_noise(loaded.rig.camera, protocol.exposure_target, protocol.frames_per_point)
 
 
 def candidates(fitted: Fitted) -> tuple[Candidate, ...]:

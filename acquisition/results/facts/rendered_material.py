@@ -19,6 +19,7 @@ from analysis.rendering.shapes import sphere
 from analysis.report.data import Rendered
 from analysis.report.style import short_number
 from instrument.config.camera import CameraConfig
+from instrument.config.load import Loaded
 
 ASSUMED_NOISE = 0.005
 """Relative u of the brightest pixel where no camera is known: 40 000 electrons."""
@@ -75,6 +76,12 @@ def _noise_sentence(noise: float | None, stereo: Stereo) -> str:
         f"Normals within {REACH_DEG:g}° of the camera count; the brightest pixel has a noise of "
         f"{short_number(100 * stereo.noise, 2)} % ({camera})."
     )
+
+
+def camera_noise(loaded: Loaded) -> float:
+    """Relative u of the brightest pixel of the rig's camera, in the frames of one point."""
+    protocol = loaded.protocol
+    return pixel_noise(loaded.rig.camera, protocol.exposure_target, protocol.frames_per_point)
 
 
 def pixel_noise(camera: CameraConfig, exposure_target: float, frames: int) -> float:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from analysis.rendering import photometric_stereo
 from analysis.rendering.material import Material
 from analysis.rendering.photometric_stereo import Recovered, three_lamps, two_lamps
 from analysis.rendering.shapes import sphere, vase
@@ -53,15 +54,22 @@ def test_the_own_model_resolves_a_highlight() -> None:
     assert found.by_model.normals_off_deg < 1
 
 
+@pytest.fixture
+def _coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(photometric_stereo, "_SPIRAL", 5000)
+
+
+@pytest.mark.usefixtures("_coarse")
 def test_three_lamps_recover_a_whole_vase() -> None:
-    found = three_lamps(rough(30), vase(50))
+    found = three_lamps(rough(30), vase(40))
     assert found.by_lambert.normals_off_deg > 6
     assert 0.7 < found.by_lambert.depth < 0.8
-    assert found.by_model.normals_off_deg < 0.7  # the table's step
+    assert found.by_model.normals_off_deg < 1.4  # the table's step
     assert found.by_model.depth == pytest.approx(1, abs=0.02)
     assert "3 lamps" in found.sentence()
 
 
+@pytest.mark.usefixtures("_coarse")
 def test_three_lamps_see_a_lambertian_sphere_as_it_is() -> None:
     surface = sphere(40)
     found = three_lamps(LAMBERT, surface)
