@@ -24,6 +24,7 @@ from analysis.models.specular.beckmann_spizzichino import BECKMANN_SPIZZICHINO
 from analysis.models.specular.ggx import GGX, GGX_F90
 from analysis.models.specular.torrance_sparrow import TORRANCE_SPARROW, TORRANCE_SPARROW_LOBE
 from analysis.models.specular.unified import UNIFIED
+from analysis.models.weighted_interreflection import OREN_NAYAR_WEIGHTED
 
 __all__ = ["MODELS", "Model", "Parameter"]
 
@@ -33,6 +34,7 @@ _ALL = (
     OREN_NAYAR_QUALITATIVE,
     OREN_NAYAR,
     OREN_NAYAR_EXACT,
+    OREN_NAYAR_WEIGHTED,
     EON,
     WOLFF,
     WOLFF_OREN_NAYAR,

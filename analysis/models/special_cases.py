@@ -29,6 +29,10 @@ SPECIAL_CASES: Mapping[str, Mapping[str, At]] = {
     "oren_nayar_qualitative": {"lambert": _SIGMA_0},
     "oren_nayar": {"lambert": _SIGMA_0},
     "oren_nayar_exact": {"lambert": _SIGMA_0},
+    "oren_nayar_weighted": {
+        "lambert": _SIGMA_0,
+        "oren_nayar": {"albedo": "albedo", "sigma_deg": "sigma_deg", "interreflection": 1.0},
+    },
     "eon": {"lambert": {"albedo": "albedo", "roughness": 0.0}},
     "wolff_oren_nayar": {"lambert": {**_SIGMA_0, "n": 1.0}},
     "torrance_sparrow_lobe": {"torrance_sparrow": {_KS: _KS, _LOBE: _SIGMA}},

@@ -42,6 +42,7 @@ CONSERVING = {
 
 NEGATIVE_AS_PRINTED = (
     "oren_nayar",
+    "oren_nayar_weighted",
     "oren_nayar+torrance_sparrow",
     "wolff_oren_nayar",
     "wolff_oren_nayar+ggx",
