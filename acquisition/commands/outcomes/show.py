@@ -79,12 +79,13 @@ def _scenes(texts: Sequence[str]) -> Sequence[Scene]:
         return SCENES
     if len(texts) > _MOST_LAMPS:
         raise InputError(f"--lamp: {len(texts)} lamps; allowed: up to {_MOST_LAMPS}")
-    lamps = tuple(_lamp(text) for text in texts)
-    named = " and ".join(text.replace(",", "° from the viewer at azimuth ") for text in texts)
-    return (Scene(lamps, f"lamp at {named}°" if len(texts) == 1 else f"lamps at {named}°"),)
+    lamps, places = zip(*(_lamp(text) for text in texts), strict=True)
+    named = "; ".join(places)
+    return (Scene(lamps, f"lamp at {named}" if len(texts) == 1 else f"lamps at {named}"),)
 
 
-def _lamp(text: str) -> Light:
+def _lamp(text: str) -> tuple[Light, str]:
+    """Return a lamp, and its place in words."""
     allowed = (
         "allowed: THETA or THETA,PHI in degrees: from the viewer, -90 to 90, and azimuth, 0 to the "
         "right, 90 above"
@@ -96,7 +97,8 @@ def _lamp(text: str) -> Light:
         raise InputError(f"--lamp: {error}; {allowed}") from None
     if len(angles) > 2 or not -90 <= angles[0] <= 90 or not abs(angles[-1]) <= 360:
         raise InputError(f"--lamp: {printable(text)}; {allowed}")
-    return light(*angles)
+    theta, phi = angles[0], angles[1] if len(angles) == 2 else 0.0
+    return light(theta, phi), f"{theta:g}° from the viewer, azimuth {phi:g}°"
 
 
 def _write(page: Path, shown: Shown) -> None:

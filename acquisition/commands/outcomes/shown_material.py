@@ -50,7 +50,7 @@ def found_material(source: str) -> Found:
         raise InputError(f"{_COMMAND}: {printable(source)}: is not there")
     else:
         sample = sample_of_text(source, _COMMAND, defaults=True)
-        found = Found(_material(sample), "a model with parameters of your own", ASSUMED_NOISE)
+        found = Found(_material(sample), "a model with given parameters", ASSUMED_NOISE)
     if not np.max(across(found.material, [HEADLIGHT], np.linspace(-80, 80, 17))) > 0:
         raise InputError(f"{_COMMAND}: {printable(source)}: reflects nothing that could be shown")
     return found

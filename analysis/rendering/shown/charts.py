@@ -118,10 +118,12 @@ def _lobes(
 ) -> None:
     whole = np.sum(list(parts.values()), axis=0)
     lambert = np.full_like(whole, shown.material.albedo / np.pi)
-    curves = parts if len(parts) < 2 else {**parts, "sum": whole}
+    alone = {shown.material.name: (whole, 0)}
+    several = {name: (values, number) for number, (name, values) in enumerate(parts.items(), 2)}
+    curves = (several if len(parts) > 1 else {}) | alone | {_LAMBERT: (lambert, 1)}
     edge = 1.05 * float(max(np.max(whole), np.max(lambert)))
     angle = np.radians(shown.views_deg)
-    for number, (name, values) in enumerate({**curves, _LAMBERT: lambert}.items()):
+    for name, (values, number) in curves.items():
         colour, _, dashes = style_of(number)
         x, y = values * np.sin(angle), values * np.cos(angle)
         ax.plot(x, y, color=colour, linestyle=dashes, label=name if labelled else None)

@@ -23,7 +23,7 @@ from analysis.report.style import (
 )
 
 _CSS = """
-.shapes { display: grid; grid-template-columns: minmax(0, 7em) repeat(4, minmax(0, 1fr));
+.shapes { display: grid; grid-template-columns: minmax(0, 8.5em) repeat(4, minmax(0, 1fr));
   gap: 8px; align-items: center; margin: 10px 0 18px; font-size: 14px; }
 .shapes svg { display: block; width: 100%; height: auto; background: #000; }
 .shapes b { font-weight: 600; overflow-wrap: anywhere; }
@@ -92,12 +92,17 @@ def _head(shown: Shown) -> str:
     )
 
 
+def _breakable(name: str) -> str:
+    """A name in HTML that may be broken between its words."""
+    return escaped(name).replace("+", "+<wbr>").replace("_", "_<wbr>")
+
+
 def _scene(shown: Shown, number: int, scene: Scene, pictures: Mapping[str, Pair]) -> str:
     white, most = _scales(pictures)
     rows = (shown.material.name, _LAMBERT, "difference")
     cells = []
     for row, law in enumerate(rows):
-        cells.append(f"<b>{escaped(law)}</b>")
+        cells.append(f"<b>{_breakable(law)}</b>")
         for shape, pair in pictures.items():
             tile = _tiles(pair, white, most)[row]
             cells.append(image_html(tile, escaped(f"{shape}: {law}")))
