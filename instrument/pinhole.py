@@ -21,7 +21,10 @@ from instrument.geometry import FloatArray, camera_direction
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pinhole:
-    """Camera at the end of the beam, aimed so that the rotation axis appears at a given pixel."""
+    """Camera at the end of the beam, aimed so that the rotation axis appears at a given pixel.
+
+    distortion: as the key of a rig file. Homographies, and the measuring window, are without it.
+    """
 
     beam_length_mm: float
     field_width_mm: float
@@ -30,6 +33,7 @@ class Pinhole:
     axis_column_px: float
     axis_row_px: float
     roll_deg: float
+    distortion: float = 0.0
 
     @classmethod
     def of(cls, rig: Rig) -> Pinhole:
@@ -43,6 +47,7 @@ class Pinhole:
             axis_column_px=camera.axis_column_px,
             axis_row_px=camera.axis_row_px,
             roll_deg=camera.roll_deg,
+            distortion=camera.distortion,
         )
 
     @property
@@ -88,6 +93,26 @@ class Pinhole:
         ) ** 2
         falloff: FloatArray = (1.0 + offset2 / self.focal_px**2) ** -2
         return falloff
+
+    def from_middle(self, points_px: FloatArray) -> FloatArray:
+        """Return the distance (...) of points (..., 2) in pixels from the picture's middle.
+
+        In units of half its diagonal.
+        """
+        half_px = math.hypot(self.width_px, self.height_px) / 2
+        return np.asarray(np.linalg.norm(points_px - self._centre_px, axis=-1) / half_px)
+
+    def bent(self, points_px: FloatArray) -> FloatArray:
+        """Return where distortion shows points (..., 2) of the ideal picture, in pixels.
+
+        The first radial term of OpenCV's model; the rotation axis stays at its pixel.
+        """
+        axis_px = np.array([self.axis_column_px, self.axis_row_px])
+        return points_px + self._shift(points_px) - self._shift(axis_px)
+
+    def _shift(self, points_px: FloatArray) -> FloatArray:
+        grown = self.distortion * self.from_middle(points_px)[..., np.newaxis] ** 2
+        return np.asarray(grown * (points_px - self._centre_px))
 
     def _intrinsic(self) -> FloatArray:
         column, row = self._centre_px

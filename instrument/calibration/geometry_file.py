@@ -27,6 +27,8 @@ CAMERA_KEYS = ("field_width_mm", "axis_row_px", "axis_column_px", "roll_deg")
 """Keys of a rig file's camera that such a calibration gives."""
 ZERO = "theta_r_zero_error_deg"
 """Key of the quantity that tells how far the zero was off."""
+DISTORTION = "distortion_percent"
+"""Key of the quantity that tells the lens's distortion."""
 _ARCHIVE = Archive("geometry", 1)
 is_geometry_file = _ARCHIVE.wrote
 """True for a path of such a file, which may be damaged all the same."""
@@ -65,6 +67,12 @@ class GeometryCalibration:
     def camera_values(self) -> dict[str, float]:
         """Return the values of `CAMERA_KEYS`."""
         return {key: getattr(self, key) for key in CAMERA_KEYS}
+
+    @property
+    def distortion(self) -> float:
+        """Relative displacement at half the picture's diagonal; 0 where it was not found."""
+        found = self.quantities.get(DISTORTION)
+        return 0.0 if found is None or found.value is None else found.value / 100
 
     @property
     def u_zero_deg(self) -> float:

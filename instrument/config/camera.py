@@ -56,7 +56,9 @@ class CameraConfig(Section):
     `u_black_level_dn`: standard deviation of the black level from frame to frame; the default is
     that of a clamp which regulates to a fraction of a count. `calibration`: file of `gonio
     calibrate camera`, beside the rig file; counts are made linear with its response curve.
-    `dark_patch`: its light is stray light, which is subtracted.
+    `dark_patch`: its light is stray light, which is subtracted. `distortion`: relative displacement
+    of a point at half the picture's diagonal, to the outside if positive, by the first radial term
+    of OpenCV's model; maps of the sample place their cells by it.
     """
 
     width_px: Annotated[int, Field(ge=16, le=16384)]
@@ -65,6 +67,7 @@ class CameraConfig(Section):
     axis_row_px: Finite
     axis_column_px: Finite
     roll_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+    distortion: Annotated[float, Field(ge=-0.2, le=0.2)] = 0.0
     bit_depth: Annotated[int, Field(ge=8, le=16)]
     full_well_electrons: Positive
     read_noise_electrons: NotNegative

@@ -132,8 +132,8 @@ class Rig(Section):
     """Complete rig file.
 
     `geometry`: file of `gonio calibrate geometry`, beside the rig file. It gives the camera's
-    `field_width_mm`, `axis_row_px`, `axis_column_px` and `roll_deg`, and `zero_deg` of theta_r with
-    its `u_zero_theta_r_deg`.
+    `field_width_mm`, `axis_row_px`, `axis_column_px`, `roll_deg` and `distortion`, and `zero_deg`
+    of theta_r with its `u_zero_theta_r_deg`.
     """
 
     name: Name
@@ -170,7 +170,9 @@ class Rig(Section):
         axis = self.axes.theta_r.with_zero(measured.zero_deg)
         u_deg = measured.u_zero_deg
         update = {
-            "camera": self.camera.model_copy(update=measured.camera_values()),
+            "camera": self.camera.model_copy(
+                update={**measured.camera_values(), "distortion": measured.distortion}
+            ),
             "axes": self.axes.model_copy(update={"theta_r": axis}),
             "uncertainty": self.uncertainty.model_copy(update={"u_zero_theta_r_deg": u_deg}),
         }

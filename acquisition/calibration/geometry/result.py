@@ -18,7 +18,7 @@ from acquisition.results.versions import versions_of
 from analysis.calibration.geometry.corners import Corners
 from analysis.calibration.geometry.geometry_fit import GeometryFit, fit_geometry
 from analysis.calibration.level_series import Estimate
-from instrument.calibration.geometry_file import ZERO, GeometryCalibration
+from instrument.calibration.geometry_file import DISTORTION, ZERO, GeometryCalibration
 from instrument.calibration.quantity import Quantity
 from instrument.config.rig import Rig
 from instrument.errors import NotDetermined
@@ -113,7 +113,7 @@ def _quantities(fit: GeometryFit, plan: GeometryPlan) -> Iterator[tuple[str, Qua
         ("axis_column_px", "px", "column of the axis"),
         ("axis_row_px", "px", "row of the table's middle"),
         ("roll_deg", "deg", "roll of the camera"),
-        ("distortion_percent", "%", "distortion at half the diagonal"),
+        (DISTORTION, "%", "distortion at half the diagonal"),
     ):
         yield key, quantity(values[key], unit, "", name)
     zero = quantity(values["zero_deg"], "deg", "", "zero of theta_r: true minus shown")

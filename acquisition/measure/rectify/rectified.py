@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -52,17 +53,24 @@ def rectify(
     sampled = sampling(grid, pinhole, theta_r_deg)
     across, down = sampled.per_cell
     size = grid.columns * across, grid.rows * down
-    points = cv2.warpPerspective(
-        light,
-        pinhole.homography(theta_r_deg, height_mm) @ grid.to_mm(sampled.per_cell),
-        size,
-        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=math.nan,
-    )
+    to_pixels = pinhole.homography(theta_r_deg, height_mm) @ grid.to_mm(sampled.per_cell)
+    outside: dict[str, Any] = {"borderMode": cv2.BORDER_CONSTANT, "borderValue": math.nan}
+    if pinhole.distortion:
+        at = _bent_places(pinhole, to_pixels, size)
+        points = cv2.remap(light, at[..., 0], at[..., 1], cv2.INTER_LINEAR, **outside)
+    else:
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        points = cv2.warpPerspective(light, to_pixels, size, flags=flags, **outside)
     if sampled.per_cell != (1, 1):
         points = cv2.resize(points, (grid.columns, grid.rows), interpolation=cv2.INTER_AREA)
     return np.asarray(points, dtype=np.float32)
+
+
+def _bent_places(pinhole: Pinhole, to_pixels: FloatArray, size: tuple[int, int]) -> FloatImage:
+    """Return the pixels (rows, columns, 2) of points in a grid of a size, columns first."""
+    columns, rows = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
+    points = apply_homography(to_pixels, np.stack([columns, rows], axis=-1))
+    return pinhole.bent(points).astype(np.float32)
 
 
 @lru_cache(maxsize=512)

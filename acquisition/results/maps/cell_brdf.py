@@ -19,6 +19,7 @@ from acquisition.measure.rectify.rectified import LEAST_SHARE, off_edge, samplin
 from acquisition.results.maps.kept_cells import CellLight
 from acquisition.results.maps.mean_curve import MeanCurve
 from acquisition.results.maps.surface_height import Height
+from acquisition.results.maps.vignetting import Vignetting
 from analysis.sample_maps.block_fit import CellData
 from analysis.sample_maps.places import Places
 from instrument.config.load import Loaded
@@ -74,9 +75,11 @@ def cell_data(
     # The tile's mean, as that of the sample, is over a patch that the lamp lights unevenly.
     factor *= _light_on_patch(readings, loaded)
     brdf, offset = light.cells, signal - light.window
-    for k in range(count):
+    vignetting = Vignetting(rig, loaded.protocol.window)
+    for k, reading in enumerate(readings):
         brdf[k] += np.float32(offset[k])
         brdf[k] *= np.float32(factor[k])
+        vignetting.take_out(brdf[k], grid, reading.theta_r_deg)
     leave_out_edges(brdf, readings, grid, loaded)
     noise = np.empty(count)
     for k, reading in enumerate(readings):

@@ -20,6 +20,7 @@ from acquisition.results.maps.kept_cells import CellSource, cell_source
 from acquisition.results.maps.mean_curve import MeanCurve
 from acquisition.results.maps.surface_height import Height, find_height, searched_views
 from acquisition.results.maps.u_shared import UnknownHeight, u_shared
+from acquisition.results.maps.vignetting import Vignetting
 from acquisition.results.reduction import Reduced, reduced_run, require_usable
 from analysis.sample_maps.block_fit import CellData, fit_blocks
 from analysis.sample_maps.places import TableField
@@ -158,12 +159,18 @@ class _Mapping:
         self, maps: dict[str, FloatArray], data: CellData, height: Height
     ) -> dict[str, FloatArray]:
         u_mm = min(height.u_mm, self._loaded.rig.u_placement_mm)
-        return u_shared(
+        found = u_shared(
             {name: maps[name] for name in self._curve.values},
             self._curve,
             data,
             UnknownHeight(u_mm, self._u_height(height), self._theta_r_deg),
         )
+        # All light of a place counts alike: it is taken for albedo, and for ks.
+        u = Vignetting(self._loaded.rig, self._loaded.protocol.window).u_relative(self._grid)
+        return {
+            name: own if name == "sigma_deg" else np.hypot(own, u * np.abs(maps[name]))
+            for name, own in found.items()
+        }
 
     def _nearest_mm(self) -> float:
         return min(self._loaded.rig.beam_length_mm, self._loaded.rig.lamp_distance_mm)

@@ -19,7 +19,8 @@ from acquisition.results.run_folder import (
     write_run_inputs,
 )
 from acquisition.rig import OpenRig
-from instrument.calibration.geometry_file import CAMERA_KEYS, write_geometry_file
+from instrument.calibration.geometry_file import CAMERA_KEYS, DISTORTION, write_geometry_file
+from instrument.calibration.quantity import Quantity
 from instrument.config.load import load_protocol, load_rig
 from instrument.errors import InputError
 from instrument.pinhole import Pinhole
@@ -48,8 +49,11 @@ def rig_file(folder: Path, *, without: tuple[str, ...] = (), **change: Any) -> P
 def test_the_rig_takes_the_values_with_or_without_numbers_of_its_own(
     tmp_path: Path, without: tuple[str, ...]
 ) -> None:
-    rig = load_rig(rig_file(tmp_path, without=without))
+    bent = Quantity(value=-1.5, u=0.1, unit="%", symbol="", name="distortion")
+    path = rig_file(tmp_path, without=without, quantities={**OWN.quantities, DISTORTION: bent})
+    rig = load_rig(path)
     pinhole = Pinhole.of(rig)
+    assert (pinhole.distortion, rig.typed.camera.distortion) == (-0.015, 0.0)
     for key, value in OWN.camera_values().items():
         assert getattr(pinhole, key) == value
         stated = value if without else BENCH["camera"].get(key)

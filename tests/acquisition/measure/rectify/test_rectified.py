@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,9 +11,11 @@ from acquisition.measure.rectify.cell_grid import CellGrid
 from acquisition.measure.rectify.light import light_dn
 from acquisition.measure.rectify.rectified import off_edge, rectify, sampling
 from instrument.config.protocol import Sample
+from instrument.config.simulated.defects import LensDefects
 from instrument.errors import InputError
 from instrument.geometry import FloatArray
 from instrument.pinhole import Pinhole, apply_homography
+from sim.defects.lens import bent_by_lens
 from tests.support.scans import small_scan
 
 
@@ -37,13 +41,19 @@ def _surface(points_mm: FloatArray) -> FloatArray:
 def _seen(camera: Pinhole, theta_r_deg: float) -> FloatArray:
     columns, rows = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
     back = np.linalg.inv(camera.homography(theta_r_deg))
-    return _surface(apply_homography(back, np.stack([columns, rows], axis=-1)))
+    pixels = np.stack([columns, rows], axis=-1).astype(np.float64)
+    ideal = pixels
+    for _ in range(12):  # the picture is bent by less than itself
+        ideal = ideal + pixels - camera.bent(ideal)
+    return _surface(apply_homography(back, ideal))
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_a_cell_has_the_light_of_its_place(seed: int) -> None:
     random = np.random.default_rng(seed + 100)
     camera, view = _camera(seed), float(random.uniform(-60, 60))
+    if seed % 2:
+        camera = replace(camera, distortion=float(random.uniform(-0.05, 0.05)))
     grid = CellGrid(float(random.uniform(1.2, 3.0)), 9, 11)
     light = _seen(camera, view).astype(np.float32)
     found = rectify(light, grid, camera, view)
@@ -51,6 +61,18 @@ def test_a_cell_has_the_light_of_its_place(seed: int) -> None:
     assert np.isfinite(found).any()
     inside = np.isfinite(found)
     assert np.abs(found - true)[inside].max() < 0.35  # of a range of about 100
+
+
+def test_a_lens_that_bends_the_picture_as_the_simulated_one_is_straightened() -> None:
+    straight, lens = _camera(4), LensDefects(distortion=-0.03)
+    light = bent_by_lens(_seen(straight, 30.0).astype(np.float32), lens)
+    grid = CellGrid(1.5, 21, 21)
+    true = rectify(_seen(straight, 30.0).astype(np.float32), grid, straight, 30.0)
+    blind, known = (
+        np.abs(rectify(light, grid, replace(straight, distortion=d), 30.0) - true)
+        for d in (0.0, -0.03)
+    )
+    assert np.nanmax(known) < 0.3 * np.nanmax(blind)
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -11,6 +11,8 @@ import pytest
 from acquisition.results.maps.sample_map import map_sample
 from analysis.sample_maps.sample_map import SampleMap
 from instrument.config.protocol import MapsConfig
+from instrument.config.simulated.defects import LensDefects
+from instrument.config.uncertainty.rig_lines import RigLines
 from instrument.errors import InputError
 from instrument.record.record import Record
 from tests.support.sample_maps.varied import Varied, truth
@@ -84,11 +86,24 @@ def test_an_even_sample_is_uniform_and_its_model_holds(tmp_path: Path) -> None:
     loaded = Varied("halves", ONE, True, 5).loaded()
     sample = loaded.protocol.simulated_sample
     assert sample is not None
-    even = changed(loaded, simulated_sample=sample.model_copy(update={"variation": None}))
+    dark_corners = LensDefects(vignetting=0.05)
+    simulation = loaded.rig.simulation.model_copy(update={"lens_defects": dark_corners})
+    even = changed(
+        loaded,
+        rig={"simulation": simulation, "uncertainty": RigLines(vignetting=0.05)},
+        simulated_sample=sample.model_copy(update={"variation": None}),
+    )
     with Record.create(tmp_path / "run", {}) as record:
         scan(even, record)
         found = map_sample(record, even, "oren_nayar", 2.0)
+        unknown = changed(even, rig={"uncertainty": RigLines(u_vignetting=0.05)})
+        vague = map_sample(record, unknown, "oren_nayar", 2.0)
     assert found.uniform
+    # Vignetting that is not known is taken for albedo, by as much as its u says.
+    assert not vague.uniform
+    off = np.abs(vague.values["albedo"] - found.values["albedo"]) / vague.u("albedo")
+    assert np.nanmax(np.abs(vague.values["albedo"] / found.values["albedo"] - 1)) > 0.01
+    assert np.mean(off[np.isfinite(off)] < 1.96) > 0.95
     assert found.rejected_share < 0.02
     spread = found.spread("sigma_deg")
     assert spread is not None
