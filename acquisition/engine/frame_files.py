@@ -23,8 +23,8 @@ from acquisition.measure.rectify.kept_files import (
     dark_name,
     frame_name,
 )
-from acquisition.measure.rectify.light import FloatImage, light_dn, window_dn
-from acquisition.measure.rectify.rectified import rectify
+from acquisition.measure.rectify.light import FloatImage, light_dn
+from acquisition.measure.rectify.of_sample import cells_of
 from acquisition.plan.plan import Plan
 from instrument.config.load import Loaded
 from instrument.config.protocol import Protocol
@@ -62,18 +62,22 @@ def write_kept(
         light = light_dn(
             [frame.image for frame in frames], dark.mean, dark.hot, rig.camera, Pinhole.of(rig)
         )
-        _write_cells(light, reading, protocol, rig, run)
+        _write_cells(light, frames[0].image, reading, protocol, rig, run)
     return write_frames(frames, reading.step, run) if protocol.keep_frames else []
 
 
 def _write_cells(
-    light: FloatImage, reading: Reading, protocol: Protocol, rig: Rig, run: Path
+    light: FloatImage,
+    image: NDArray[Any],
+    reading: Reading,
+    protocol: Protocol,
+    rig: Rig,
+    run: Path,
 ) -> None:
     """Write the light of the window, then of each cell, as 32-bit floats in DN."""
     assert protocol.maps is not None
     grid, pinhole = CellGrid.of(protocol.sample, rig, protocol.maps.cell_mm), Pinhole.of(rig)
-    window = window_dn(light, reading.theta_r_deg, pinhole, protocol.window)
-    cells = rectify(light, grid, pinhole, reading.theta_r_deg)
+    window, cells = cells_of(light, image, reading.theta_r_deg, grid, pinhole, protocol)
     file = io.BytesIO()
     np.save(file, np.concatenate([np.array([window], dtype=np.float32), cells.ravel()]))
     try:

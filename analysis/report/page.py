@@ -27,15 +27,26 @@ from analysis.report.style import (
 from analysis.report.sweeps import PlottedSweep, group_sweeps
 from instrument.text.atomic_file import write_whole
 
+MAP_PAGE = "map.html"
 _NO_TILE = (
     "No white tile was measured, so there is no BRDF: the radiance is relative, in counts per "
     "second of this camera, lamp and lens. Only its dependence on angle is meaningful."
 )
 
 
+_MAP_LINK = (
+    f'<p class="soft"><a href="{MAP_PAGE}">Map of the sample</a>: albedo and roughness in each '
+    "place</p>"
+)
+
+
 def write_report(path: Path, data: ReportData) -> None:
-    """Write the report atomically: `path` holds the old file or the complete new one."""
-    write_whole(path, report_html(data))
+    """Write the report atomically: `path` holds the old file or the complete new one.
+
+    It links to the map of the sample if there is one beside it.
+    """
+    page = report_html(data)
+    write_whole(path, with_map(page) if (path.parent / MAP_PAGE).is_file() else page)
 
 
 def report_html(data: ReportData) -> str:
@@ -56,6 +67,11 @@ def report_html(data: ReportData) -> str:
         points_html(data, sweeps) if sweeps else "",
     ]
     return html_page(escaped(data.title), CSS, body, HOVER if sweeps else "")
+
+
+def with_map(page: str) -> str:
+    """Return a report that links to the map of its sample, beside it; unchanged if it does."""
+    return page if _MAP_LINK in page else page.replace("</header>", f"{_MAP_LINK}\n</header>", 1)
 
 
 def _number(value: float | None, form: str) -> str:

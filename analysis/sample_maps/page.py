@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,9 @@ import numpy as np
 from analysis.report.figures.charts import margins
 from analysis.report.style import (
     CSS,
-    INK,
+    NARROW_IN,
+    Drawing,
+    embedded_svg,
     escaped,
     figure_html,
     format_value,
@@ -19,9 +22,9 @@ from analysis.report.style import (
     svg_of,
     table_html,
 )
+from analysis.sample_maps.pictures import Panel, maps_html
 from analysis.sample_maps.sample_map import UNITS, SampleMap
 from analysis.sample_maps.spread import Spread
-from instrument.geometry import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,24 +33,31 @@ if TYPE_CHECKING:
 # Of the cells, whose values the colours span; u rises where fewer views show a cell, at the edges.
 _SHOWN_PERCENT, _SHOWN_U_PERCENT = (1.0, 99.0), (1.0, 94.0)
 _BINS = 80
-_HIGH_IN, _HISTOGRAM_IN = 4.3, 3.0
+_HISTOGRAM_IN = 2.8
 _NAMES = {"albedo": "albedo", "sigma_deg": "σ (°)", "ks": "kₛ"}
 _MOST_CHI2 = 3.0  # of the colours of chi2 over its expectation
 
 
-def map_html(found: SampleMap) -> str:
-    """Return the page; the same map gives the same text."""
-    body = [_head(found), _verdict(found), _pictures(found), _numbers(found), _misfit(found)]
+def map_html(found: SampleMap, report: str | None = None) -> str:
+    """Return the page; the same map gives the same text. report: page of its run, beside it."""
+    body = [
+        _head(found, report),
+        _verdict(found),
+        _pictures(found),
+        _numbers(found),
+        _misfit(found),
+    ]
     return html_page(f"Map of {found.sample}", CSS, body)
 
 
-def _head(found: SampleMap) -> str:
+def _head(found: SampleMap, report: str | None) -> str:
     rows, columns = found.chi2.shape
+    link = f'<p class="soft"><a href="{report}">Report of the run</a></p>\n' if report else ""
     return (
         f"<header>\n<h1>Map of the sample: {escaped(found.title)}</h1>\n"
         f'<p class="sample">Sample: <b>{escaped(found.sample)}</b></p>\n'
         f'<p class="soft">{columns} × {rows} cells of {found.cell_mm:g} mm; {found.model} fitted '
-        f"in each, at up to {found.geometries} geometries.</p>\n</header>"
+        f"in each, at up to {found.geometries} geometries.</p>\n{link}</header>"
     )
 
 
@@ -84,53 +94,17 @@ def _short(value: float, unit: str) -> str:
 
 
 def _pictures(found: SampleMap) -> str:
-    names = tuple(found.values)
-
-    def draw(canvas: Figure) -> None:
-        places = {"hspace": 0.3, "wspace": 0.3, **margins(canvas, 0.75, 0.6, 0.6, 0.5)}
-        grid = canvas.add_gridspec(len(names), 2, **places)
-        for row, name in enumerate(names):
-            left, right = (canvas.add_subplot(grid[row, column]) for column in range(2))
-            _picture(canvas, left, found, found.values[name], _NAMES[name])
-            u_title = f"u of {_NAMES[name]}"
-            _picture(canvas, right, found, found.u(name), u_title, _SHOWN_U_PERCENT)
-
-    svg = svg_of(0.5 + _HIGH_IN * len(names), draw, "maps")
+    panels = []
+    for name in found.values:
+        panels.append(Panel(_NAMES[name], found.values[name], _SHOWN_PERCENT))
+        panels.append(Panel(f"u of {_NAMES[name]}", found.u(name), _SHOWN_U_PERCENT))
     caption = (
-        "Left: each cell's value; right: its standard uncertainty (k = 1), with what all cells "
-        "share. Places are seen along the normal and count from the rotation axis; at Δφ = 0° the "
-        "lamp is at +x. The colours span nearly all cells; a pointed end of their bar holds the "
-        "rest. White: no fit."
+        "Each cell's value, and its standard uncertainty (k = 1) with what all cells share. Places "
+        "are seen along the normal and count from the rotation axis; at Δφ = 0° the lamp is at +x. "
+        "The colours span nearly all cells; a pointed end of their bar holds the rest. White: no "
+        "fit."
     )
-    return f'<h2 id="maps">Maps</h2>\n{figure_html([svg], "Maps of the sample", caption)}'
-
-
-def _picture(
-    canvas: Figure,
-    axes: Axes,
-    found: SampleMap,
-    values: FloatArray,
-    title: str,
-    shown: tuple[float, float] = _SHOWN_PERCENT,
-) -> None:
-    known = values[np.isfinite(values)]
-    low, high = np.percentile(known, shown) if known.size else (0.0, 1.0)
-    if high - low < 1e-9 * max(abs(high), 1e-12):
-        low, high = low - 0.5 * abs(low or 1.0), high + 0.5 * abs(high or 1.0)
-    half = found.cell_mm / 2
-    extent = (
-        found.x_mm[0] - half, found.x_mm[-1] + half, found.y_mm[-1] - half, found.y_mm[0] + half,
-    )  # fmt: skip
-    drawn = axes.imshow(
-        values, vmin=low, vmax=high, extent=extent, cmap="viridis", interpolation="nearest"
-    )
-    axes.grid(visible=False)
-    axes.set_title(title, color=INK, loc="left", pad=6)
-    axes.set_xlabel("x (mm)")
-    axes.set_ylabel("y (mm)")
-    beyond = bool(np.any(known < low)), bool(np.any(known > high))
-    ends = {(False, False): "neither", (True, False): "min", (False, True): "max"}
-    canvas.colorbar(drawn, ax=axes, shrink=0.9, extend=ends.get(beyond, "both"))
+    return f'<h2 id="maps">Maps</h2>\n{maps_html(found, panels, "Maps of the sample", caption)}'
 
 
 def _numbers(found: SampleMap) -> str:
@@ -138,18 +112,22 @@ def _numbers(found: SampleMap) -> str:
     heads = ("Parameter", "#Median", "#Scatter", "#Explained by u", "#Beyond u", "#u shared")
     table = table_html((*heads, "#Mean curve"), rows)
 
-    def draw(canvas: Figure) -> None:
-        places = {"wspace": 0.25, **margins(canvas, 0.75, 0.15, 0.35, 0.6)}
-        grid = canvas.add_gridspec(1, len(found.values), **places)
-        for column, name in enumerate(found.values):
-            _histogram(canvas.add_subplot(grid[0, column]), found, name)
+    def draw(canvas: Figure, columns: int) -> None:
+        rows = -(-len(found.values) // columns)
+        places = {"wspace": 0.25, "hspace": 0.35, **margins(canvas, 0.75, 0.15, 0.35, 0.6)}
+        grid = canvas.add_gridspec(rows, columns, **places)
+        for number, name in enumerate(found.values):
+            _histogram(canvas.add_subplot(grid[divmod(number, columns)]), found, name)
 
-    svg = svg_of(_HISTOGRAM_IN, draw, "histograms")
+    count = len(found.values)
+    wide = svg_of(_HISTOGRAM_IN, partial(draw, columns=count), "histograms")
+    tall = Drawing(count * _HISTOGRAM_IN, partial(draw, columns=1), NARROW_IN)
+    narrow = embedded_svg(tall, "narrow-histograms")
     caption = (
         "Cells by their value; the line is the fit to the mean curve of the measuring window, "
         "which on a sample that is not uniform describes no place of it."
     )
-    chart = figure_html([svg], "Histograms of the cells", caption)
+    chart = figure_html([wide], "Histograms of the cells", caption, [narrow])
     explained = (
         '<p class="soft">Scatter: standard deviation over the cells. Explained by u: root mean '
         "square of what is independent from cell to cell. u shared: median of what all cells have "
@@ -178,6 +156,7 @@ def _histogram(axes: Axes, found: SampleMap, name: str) -> None:
     axes.axvline(mean, color="#D55E00", linewidth=1.6)
     axes.set_xlabel(_NAMES[name])
     axes.set_ylabel("cells")
+    axes.locator_params(axis="x", nbins=5)
 
 
 def _misfit(found: SampleMap) -> str:
@@ -191,11 +170,7 @@ def _misfit(found: SampleMap) -> str:
     )
     dof = np.maximum(np.nan_to_num(found.count) - len(found.values), 1)
     ratio = np.minimum(found.chi2 / dof, _MOST_CHI2 + 0.01)
-
-    def draw(canvas: Figure) -> None:
-        grid = canvas.add_gridspec(1, 1, **margins(canvas, 0.75, 2.6, 0.5, 0.5))
-        _picture(canvas, canvas.add_subplot(grid[0]), found, ratio, "χ² / degrees of freedom")
-
-    svg = svg_of(0.4 + _HIGH_IN, draw, "misfit")
-    chart = figure_html([svg], "Misfit of each cell", "About 1 where the model holds.")
+    panel = Panel("χ² / degrees of freedom", ratio, _SHOWN_PERCENT)
+    caption = "About 1 where the model holds."
+    chart = maps_html(found, [panel], "Misfit of each cell", caption)
     return f'<h2 id="misfit">Places where the model does not hold</h2>\n<p>{text}</p>\n{chart}'

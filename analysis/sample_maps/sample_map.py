@@ -76,4 +76,5 @@ class SampleMap:
         varies = [n for n in self.values if (s := self.spread(n)) is not None and not s.uniform]
         if not varies:
             return "The sample is uniform: its cells scatter no more than their u."
-        return f"The sample is not uniform: its cells differ in {' and '.join(varies)}."
+        listed = " and ".join(filter(None, (", ".join(varies[:-1]), varies[-1])))
+        return f"The sample is not uniform: its cells differ in {listed}."

@@ -13,6 +13,7 @@ from acquisition.results.run_folder import load_run_inputs
 from acquisition.terminal.console import out, print_lines, print_notes, print_text
 from acquisition.terminal.layout import table_lines
 from acquisition.terminal.progress import sign_of_life
+from analysis.report.page import MAP_PAGE, with_map
 from analysis.report.style import format_value, short_number
 from analysis.sample_maps.files import nexus_bytes, npz_bytes
 from analysis.sample_maps.page import map_html
@@ -22,6 +23,7 @@ from instrument.record.record import Record
 from instrument.text.atomic_file import read_file, write_whole
 
 _MOST_BYTES = 32 * 1024**2  # of fit.json
+_MOST_REPORT_BYTES = 512 * 1024**2
 _DEFAULT = "oren_nayar"
 
 
@@ -38,16 +40,29 @@ def map_run(
         loaded = load_run_inputs(record)
         with sign_of_life("map of the sample"):
             found = map_sample(record, loaded, wanted, cell_mm)
-            files = {"map.npz": npz_bytes(found), "map.html": map_html(found).encode()}
+            report = run / "report.html"
+            page = map_html(found, report.name if report.is_file() else None)
+            files = {"map.npz": npz_bytes(found), MAP_PAGE: page.encode()}
             if nexus:
                 files["map.nxs"] = nexus_bytes(found)
     for name, content in files.items():
         write_whole(run / name, content)
+    if report.is_file():
+        _link_from(report)
     if as_json:
         print_json({**_json(found), "files": [str(run / name) for name in files]})
         return
     _print(found, note)
     print_lines(["", *(str(run / name) for name in files)])
+
+
+def _link_from(report: Path) -> None:
+    """Let the report of the run link to the map; a file that is no text is no report."""
+    try:
+        page = read_file(report, _MOST_REPORT_BYTES).decode()
+    except (OSError, ValueError):
+        return
+    write_whole(report, with_map(page))
 
 
 def _chosen(run: Path) -> tuple[str, str]:

@@ -40,6 +40,11 @@ class PlateShift:
     turn_deg: float
     markers: int
 
+    def to_table(self) -> FloatArray:
+        """Return the matrix (3, 3) from points (x, y, 1) of the plate, in mm, to the table's."""
+        c, s = np.cos(np.radians(self.turn_deg)), np.sin(np.radians(self.turn_deg))
+        return np.array([[c, -s, self.x_mm], [s, c, self.y_mm], [0, 0, 1.0]])
+
 
 def plate_shift(
     image: NDArray[Any],
@@ -61,6 +66,17 @@ def plate_shift(
     c, s = np.cos(turn), np.sin(turn)
     shift = seen.mean(axis=0) - np.array([[c, -s], [s, c]]) @ own.mean(axis=0)
     return PlateShift(float(shift[0]), float(shift[1]), float(np.degrees(turn)), len(found))
+
+
+def known_place(
+    image: NDArray[Any], theta_r_deg: float, pinhole: Pinhole, markers: Markers
+) -> PlateShift | None:
+    """Return the shift and the turn of the plate in a picture (rows, columns) in counts.
+
+    theta_r_deg: signed view angle. None where fewer than two markers are seen, which tell no turn.
+    """
+    shift = plate_shift(image, theta_r_deg, pinhole, markers)
+    return shift if shift is not None and shift.markers > 1 else None
 
 
 def _turn(own: FloatArray, seen: FloatArray) -> float:

@@ -52,12 +52,19 @@ def light_dn(
     return total
 
 
-def window_dn(light: FloatImage, theta_r_deg: float, pinhole: Pinhole, patch: PatchConfig) -> float:
+def window_dn(
+    light: FloatImage,
+    theta_r_deg: float,
+    pinhole: Pinhole,
+    patch: PatchConfig,
+    centre_mm: tuple[float, float] = (0.0, 0.0),
+) -> float:
     """Return the mean light of the measured patch over its area, in DN, pixels with NaN apart.
 
-    light: (rows, columns) in DN, as `light_dn` returns it; theta_r is signed.
+    light: (rows, columns) in DN, as `light_dn` returns it; theta_r is signed. centre_mm:
+    of the patch, from the rotation axis.
     """
-    window = window_at(theta_r_deg, pinhole, patch.width_mm, patch.height_mm)
+    window = window_at(theta_r_deg, pinhole, patch.width_mm, patch.height_mm, centre_mm)
     rows, columns = np.ogrid[window.crop]
     area = window.weights * pinhole.cos4(columns, rows)
     own = light[window.crop]

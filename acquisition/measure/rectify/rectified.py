@@ -42,18 +42,22 @@ def rectify(
     pinhole: Pinhole,
     theta_r_deg: float,
     height_mm: float = 0.0,
+    to_table: FloatArray | None = None,
 ) -> FloatImage:
     """Return the light of each cell, (rows, columns) of the grid, in the unit of the pixels' light.
 
-    height_mm: of the surface above the rotation axis. NaN for a cell that lies partly outside the
-    picture, or has a pixel without a value.
+    height_mm: of the surface above the rotation axis. to_table: (3, 3), from points (x, y, 1) of
+    the sample, in mm, to those of the table, where it lies in the middle if None. NaN for a cell
+    that lies partly outside the picture, or has a pixel without a value.
     """
     import cv2
 
     sampled = sampling(grid, pinhole, theta_r_deg)
     across, down = sampled.per_cell
     size = grid.columns * across, grid.rows * down
-    to_pixels = pinhole.homography(theta_r_deg, height_mm) @ grid.to_mm(sampled.per_cell)
+    to_mm = grid.to_mm(sampled.per_cell)
+    to_mm = to_mm if to_table is None else to_table @ to_mm
+    to_pixels = pinhole.homography(theta_r_deg, height_mm) @ to_mm
     outside: dict[str, Any] = {"borderMode": cv2.BORDER_CONSTANT, "borderValue": math.nan}
     if pinhole.distortion:
         at = _bent_places(pinhole, to_pixels, size)

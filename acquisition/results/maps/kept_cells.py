@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from acquisition.measure.hot_pixels import find_hot_pixels
 from acquisition.measure.rectify.cell_grid import CellGrid
 from acquisition.measure.rectify.kept_files import cells_name, dark_name, step_of
-from acquisition.measure.rectify.light import FloatImage, light_dn, window_dn
-from acquisition.measure.rectify.rectified import rectify
+from acquisition.measure.rectify.light import FloatImage, light_dn
+from acquisition.measure.rectify.of_sample import cells_of
 from acquisition.results.maps.surface_height import at_height, smoothing
 from instrument.config.load import Loaded
 from instrument.errors import InputError
@@ -159,7 +159,7 @@ class KeptFrames:
     def __init__(self, record: Record, loaded: Loaded, grid: CellGrid) -> None:
         self._grid = grid
         self._run, self._camera = record.folder, loaded.rig.camera
-        self._pinhole, self._patch = Pinhole.of(loaded.rig), loaded.protocol.window
+        self._pinhole, self._protocol = Pinhole.of(loaded.rig), loaded.protocol
         self._names = _by_step(record)
         self._means = {exposure_s: mean for exposure_s, _, mean, _ in record.darks()}
         self._darks: dict[float, tuple[FloatImage | float, BoolArray | None]] = {}
@@ -199,19 +199,23 @@ class KeptFrames:
         window = np.empty(len(readings))
 
         def read(k: int) -> None:
-            light = self._light(readings[k])
-            window[k] = window_dn(light, readings[k].theta_r_deg, self._pinhole, self._patch)
-            cells[k] = rectify(light, grid, self._pinhole, readings[k].theta_r_deg, height_mm)
+            window[k], cells[k] = self._cells(readings[k], grid, height_mm)
 
         with ThreadPoolExecutor(_WORKERS) as pool:
             for _ in pool.map(read, range(len(readings))):
                 pass
         return CellLight(cells, window, np.ones(len(readings)), np.zeros(len(readings)))
 
-    def _light(self, reading: Reading) -> FloatImage:
+    def _cells(
+        self, reading: Reading, grid: CellGrid, height_mm: float
+    ) -> tuple[float, FloatImage]:
+        """Return the light of the window and of the cells (rows, columns), in DN."""
         images = [self._image(name) for name in self._names[reading.step]]
         dark, hot = self._darks[reading.exposure_s]
-        return light_dn(images, dark, hot, self._camera, self._pinhole)
+        light = light_dn(images, dark, hot, self._camera, self._pinhole)
+        return cells_of(
+            light, images[0], reading.theta_r_deg, grid, self._pinhole, self._protocol, height_mm
+        )
 
     def _dark(self, exposure_s: float) -> tuple[FloatImage | float, BoolArray | None]:
         name = dark_name(exposure_s)

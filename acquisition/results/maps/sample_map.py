@@ -45,11 +45,6 @@ def map_sample(
     Raises `InputError` where frames were not kept or are missing, or the cells have no size that
     the camera resolves, and `NotDetermined` where the curve does not determine the model.
     """
-    if loaded.protocol.markers is not None:
-        raise InputError(
-            f"{record.folder}: its window follows markers, which a map does not; allowed: a run "
-            "without markers"
-        )
     cell_mm = usual_cell_mm(loaded) if cell_mm is None else cell_mm
     grid = CellGrid.of(loaded.protocol.sample, loaded.rig, cell_mm)
     frames = cell_source(record, loaded, grid)
@@ -122,7 +117,9 @@ class _Mapping:
         return TableField.of(self._curve.fit.model, places, half_mm)
 
     def _u_height(self, height: Height) -> float:
-        """Return u of the height in units of the rig's placement."""
+        """Return u of the height in units of the rig's placement; markers hide where it is."""
+        if self._loaded.protocol.markers is not None:
+            return 1.0
         u_placement_mm = self._loaded.rig.u_placement_mm
         return min(height.u_mm / u_placement_mm, 1.0) if u_placement_mm else 0.0
 

@@ -29,9 +29,9 @@ class Varied:
     tile: bool
     seed: int
 
-    def loaded(self) -> Loaded:
-        """Return a scan with a small camera, of parameters drawn from the seed."""
-        small, random = small_scan(shrink=4), np.random.default_rng(self.seed)
+    def loaded(self, shrink: int = 4) -> Loaded:
+        """Return a scan with 1/shrink of the camera's pixels, of parameters drawn from the seed."""
+        small, random = small_scan(shrink=shrink), np.random.default_rng(self.seed)
         one, other = (
             {"albedo": float(a), "sigma_deg": float(s)}
             for a, s in zip(random.uniform(0.3, 0.9, 2), random.uniform(12, 40, 2), strict=True)

@@ -32,6 +32,8 @@ def test_a_map_is_written_and_told(run: Path) -> None:
     page = (run / "map.html").read_text()
     assert "<svg" in page
     assert "25 × 25 cells of 2 mm" in page
+    assert 'href="report.html"' in page
+    assert (run / "report.html").read_text().count('href="map.html"') == 1
     with np.load(run / "map.npz") as maps:
         sigma, u, x = maps["sigma_deg"], maps["u_sigma_deg"], maps["x_mm"]
         assert str(maps["model"]) == "oren_nayar"
@@ -51,6 +53,7 @@ def test_a_model_may_be_named_and_the_result_is_json(run: Path) -> None:
     done = gonio_here("map", run, "--cell-mm", "3", "--model", model, "--json")
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
+    assert (run / "report.html").read_text().count('href="map.html"') == 1
     assert told["model"] == model
     assert (told["rows"], told["columns"]) == (16, 16)
     assert set(told["parameters"]) == {"albedo", "sigma_deg", "ks"}

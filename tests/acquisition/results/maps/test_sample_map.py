@@ -15,6 +15,7 @@ from instrument.config.simulated.defects import LensDefects
 from instrument.config.uncertainty.rig_lines import RigLines
 from instrument.errors import InputError
 from instrument.record.record import Record
+from tests.support.plates import with_plate
 from tests.support.sample_maps.varied import Varied, truth
 from tests.support.scans import changed, shortest_scan
 from tests.support.whole_scans.stopped_scan import scan
@@ -109,6 +110,38 @@ def test_an_even_sample_is_uniform_and_its_model_holds(tmp_path: Path) -> None:
     assert spread is not None
     assert spread.median == pytest.approx(sample.parameters["sigma_deg"], abs=0.3)
     assert np.isinf(found.height_mm[1])  # no texture shows it
+
+
+def test_cells_follow_the_plate_where_its_markers_are_seen(tmp_path: Path) -> None:
+    loaded = with_plate(Varied("halves", ONE, True, 8).loaded(shrink=2), 1.4, -1.1, 1.0, 0.15)
+    (sweep,) = loaded.protocol.sweeps
+    some = changed(loaded, sweeps=[{**sweep, "theta_r_deg": [-60.0, -35.0, -10.0, 15.0, 55.0]}])
+    gathering = changed(some, maps=MapsConfig(cell_mm=2.0))
+    with Record.create(tmp_path / "run", {}) as record:
+        scan(gathering, record)
+        found = map_sample(record, some, "oren_nayar", 2.0)
+        gathered = map_sample(record, changed(gathering, keep_frames=False), "oren_nayar", 2.0)
+        blind = map_sample(record, changed(some, markers=None), "oren_nayar", 2.0)
+    true = truth(found, some)
+    for cells in (found, gathered):
+        assert _inside(cells, true, "sigma_deg").mean() > 0.85
+        assert _inside(cells, true, "albedo").mean() > 0.85
+    edge = np.abs(found.x_mm) < 5.0  # a plate that is turned, too, is seen by its edge
+    apart = [
+        np.nanmax(np.abs(m.values["albedo"] / true["albedo"] - 1)[:, edge]) for m in (found, blind)
+    ]
+    assert apart[0] < 0.02 < apart[1]
+
+
+def test_a_scan_that_does_not_stop_is_mapped(tmp_path: Path) -> None:
+    loaded = Varied("halves", ONE, True, 6).loaded()
+    flown = changed(loaded, motion="fly", frames_per_point=1)
+    with Record.create(tmp_path / "run", {}) as record:
+        scan(flown, record)
+        found = map_sample(record, flown, "oren_nayar", 2.5)
+    assert found.height_mm[0] == pytest.approx(0.15, abs=0.04)
+    assert _inside(found, truth(found, flown), "sigma_deg").mean() > 0.85
+    assert found.rejected_share < 0.06  # the edge is a twentieth of the cells
 
 
 def test_a_run_without_frames_or_with_wrong_ones_is_refused(tmp_path: Path) -> None:
