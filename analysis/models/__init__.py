@@ -22,6 +22,7 @@ from analysis.models.smooth.wolff import WOLFF
 from analysis.models.smooth.wolff_oren_nayar import WOLFF_OREN_NAYAR
 from analysis.models.specular.beckmann_spizzichino import BECKMANN_SPIZZICHINO
 from analysis.models.specular.ggx import GGX, GGX_F90
+from analysis.models.specular.spike_and_lobe import SPIKE_AND_LOBE
 from analysis.models.specular.torrance_sparrow import TORRANCE_SPARROW, TORRANCE_SPARROW_LOBE
 from analysis.models.specular.unified import UNIFIED
 from analysis.models.weighted_interreflection import OREN_NAYAR_WEIGHTED
@@ -41,6 +42,7 @@ _ALL = (
     TORRANCE_SPARROW,
     TORRANCE_SPARROW_LOBE,
     BECKMANN_SPIZZICHINO,
+    SPIKE_AND_LOBE,
     UNIFIED,
     GGX,
     GGX_F90,
