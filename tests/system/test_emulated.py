@@ -22,8 +22,13 @@ from tests.support.command import gonio, gonio_here
 from tests.support.paths import CONFIGS
 from tests.support.ready.ready_process import ReadyProcess
 from tests.support.scans import TWO_MODELS, small_demo
-from tests.support.whole_scans.emulated_rig import EMULATED_RIG, quick_emulated_rig
-from tests.support.whole_scans.simulated_rig import assert_same_within_noise, points, simulated
+from tests.support.whole_scans.simulated_rig import (
+    EMULATED_RIG,
+    assert_same_within_noise,
+    points,
+    quick_emulated_rig,
+    simulated,
+)
 
 pytestmark = [
     pytest.mark.real_time,

@@ -25,7 +25,7 @@ from tests.support.live.chromium import missing
 from tests.support.live.watching_browser import WatchingBrowser, watching_browser
 from tests.support.paths import ROOT
 from tests.support.scans import TWO_MODELS, small_demo
-from tests.support.whole_scans.emulated_rig import EMULATED_RIG, quick_emulated_rig
+from tests.support.whole_scans.simulated_rig import EMULATED_RIG, quick_emulated_rig
 
 pytest.importorskip("uvicorn", reason="the live page's libraries are not installed")
 pytestmark = pytest.mark.skipif(

@@ -16,7 +16,7 @@ from tests.support.command import gonio
 from tests.support.live.chromium import Windows, missing
 from tests.support.live.live_scan import live_command
 from tests.support.scans import TWO_MODELS, small_demo
-from tests.support.whole_scans.emulated_rig import quick_emulated_rig
+from tests.support.whole_scans.simulated_rig import quick_emulated_rig
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
