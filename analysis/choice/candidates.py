@@ -15,33 +15,44 @@ from analysis.data.measurements import Measurements
 from analysis.fit.first_fit import FirstFit, FirstFits, enough_points
 from analysis.fit.fit import FitResult, refine
 from analysis.fit.relative_scale import FACTOR_NAME, normalise_lamp_levels
-from analysis.models import MODELS
+from analysis.models import MODELS, Model
 from instrument.errors import NotDetermined
+
+# chi2 relative to the lowest, both on a part of very many points: a smaller model that is preferred
+# to a larger one has hardly more.
+_HOPELESS = 1.5
 
 
 @dataclass(frozen=True, slots=True)
 class Candidates:
     """First fits to the measurements in the order of the names, and models left out.
 
-    every: fit an integrated model even where its functional form is accurate enough.
+    every: fit an integrated model even where its functional form is accurate enough. screened: of
+    very many points, fit a model roughly that is far behind on a part of them.
     left_out: models with too many parameters for the points.
     """
 
     fits: FirstFits
     robust: bool
     every: bool
+    screened: bool
     first: tuple[FirstFit, ...] = ()
     left_out: tuple[str, ...] = ()
 
     @classmethod
     def of(
-        cls, names: Sequence[str], measurements: Measurements, robust: bool, every: bool
+        cls,
+        names: Sequence[str],
+        measurements: Measurements,
+        robust: bool,
+        every: bool,
+        screened: bool = False,
     ) -> Candidates:
         """First fits of the named models.
 
         Raises `NotDetermined` where the points are too few for all, `KeyError` for an unknown one.
         """
-        found = cls(FirstFits(measurements), robust, every).with_more(names)
+        found = cls(FirstFits(measurements), robust, every, screened).with_more(names)
         if not found.first:
             n = measurements.size
             few = "1 point is" if n == 1 else f"{n} points are"
@@ -58,12 +69,29 @@ class Candidates:
         m = self.fits.measurements
         first = {f.model.name: f for f in self.first}
         named = [MODELS[name] for name in names]
-        for model in (model for model in named if enough_points(model, m)):
+        enough = [model for model in named if enough_points(model, m)]
+        hopeless = self._hopeless(enough) if self.screened else set()
+        for model in enough:
             form = first.get(functional_form(model.name) or "")
             if self.every or form is None or _form_inaccurate(form, m):
-                first[model.name] = self.fits.of(model)
+                fitted = self.fits.roughly if model.name in hopeless else self.fits.of
+                first[model.name] = fitted(model)
         few = tuple(model.name for model in named if not enough_points(model, m))
         return replace(self, first=tuple(first.values()), left_out=(*self.left_out, *few))
+
+    def _hopeless(self, models: Sequence[Model]) -> set[str]:
+        """Models whose chi2 on a part of very many points is far above the lowest there.
+
+        Their search is not followed to the end: chi2 is known to about a hundredth, which is no
+        reason to prefer one. Only for points that share no errors, which else may explain most of
+        chi2.
+        """
+        part = self.fits.part
+        if part is None:
+            return set()
+        chi2 = {model.name: part.of(model).solution.chi2 for model in models}
+        least = min([*chi2.values(), *(one.solution.chi2 for one in part.made.values())])
+        return {name for name, own in chi2.items() if own > _HOPELESS * least}
 
     def refined(
         self,
@@ -81,7 +109,12 @@ class Candidates:
     def profiled(self, name: str, acceptance: Acceptance | None) -> FitResult:
         """Fit the candidate of that name with all uncertainties and intervals."""
         (own,) = (f for f in self.first if f.model.name == name)
-        return refine(own, self.fits.measurements, acceptance, self.robust)
+        return refine(
+            self.fits.of(own.model) if own.rough else own,
+            self.fits.measurements,
+            acceptance,
+            self.robust,
+        )
 
 
 def _best(first: Iterable[FirstFit]) -> FirstFit:

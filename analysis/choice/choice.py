@@ -22,6 +22,7 @@ from analysis.choice.preference import simplest
 from analysis.choice.runs_test import worst_stretches
 from analysis.choice.symmetry_test import Symmetry, symmetry
 from analysis.data.acceptance import Acceptance
+from analysis.data.covariance import has_shared_errors
 from analysis.data.measurements import Measurements
 from analysis.fit.certificate import led_by_certificate
 from analysis.fit.criteria import LEAST_NOISE
@@ -76,7 +77,8 @@ def choose(
     Without `models`, the candidates are those of the ladder, up to the first rung that explains the
     data and, within the models of up to three parameters, the next one, which may be right; an
     integrated model whose functional form is as accurate is then left out, unless a `method` for
-    the rough surface is requested. Models with too many parameters for the points are left out.
+    the rough surface is requested. Of more than 4000 points one that is far behind on a part of
+    them is fitted roughly. Models with too many parameters for the points are left out.
     `certificate_leads`: the chosen model's parameters are those at the scale of the certificate,
     which the model's form may else correct (`analysis.fit.certificate`).
     Raises `NotDetermined` when the points are too few for all of them or show no light, `KeyError`
@@ -84,7 +86,9 @@ def choose(
     """
     require_light(measurements)
     first, *others = _rungs(measurements, models, method)
-    tried = Candidates.of(first, measurements, robust, every=models is not None)
+    every = models is not None
+    screened = not (every or robust or acceptance or has_shared_errors(measurements))
+    tried = Candidates.of(first, measurements, robust, every, screened)
     fitted = _Fitted.of(tried.refined(acceptance), tried.measurements)
     for rung in others:
         explained = bool(fitted.within_u)

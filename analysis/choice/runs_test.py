@@ -94,13 +94,13 @@ def worst_stretches(m: Measurements, residuals: FloatArray, most: int = 3) -> li
     `residuals` (N,) are in units of u, 0 for points set aside. All but the first of the stretches
     are significant.
     """
-    plane, _ = plane_and_view(m)
+    plane, views = plane_and_view(m)
     swept = sweeps(m)
     inside = np.concatenate([s.points for s in swept]) if swept else np.zeros(0, dtype=np.int64)
     outside = np.setdiff1d(np.arange(m.size), inside)
     single = [Sweep(float(m.theta_i_deg[k]), float(plane[k]), np.array([k])) for k in outside]
     found = [
-        _stretch(sweep, part, m, residuals)
+        _stretch(sweep, part, m, views, residuals)
         for sweep in (*swept, *single)
         for part in _one_sided(sweep.points, residuals)
     ]
@@ -117,13 +117,16 @@ def _one_sided(points: IntArray, residuals: FloatArray) -> list[IntArray]:
     return np.split(points, np.flatnonzero(sign[1:] != sign[:-1]) + 1)
 
 
-def _stretch(sweep: Sweep, points: IntArray, m: Measurements, residuals: FloatArray) -> Stretch:
-    """Stretch named by the points' own dphi where they have one, else by the sweep's."""
+def _stretch(
+    sweep: Sweep, points: IntArray, m: Measurements, views: FloatArray, residuals: FloatArray
+) -> Stretch:
+    """Stretch named by the points' own dphi where they have one, else by the sweep's.
+
+    views: theta_r (N,) signed in the plane, in degrees.
+    """
     mean = float(np.mean(residuals[points]))
     weight = abs(mean) * math.sqrt(points.size)
     own = np.unique(m.dphi_deg[points])
-    dphi, views = (
-        (float(own[0]), m.theta_r_deg) if own.size == 1 else (sweep.dphi_deg, plane_and_view(m)[1])
-    )
+    dphi, views = (float(own[0]), m.theta_r_deg) if own.size == 1 else (sweep.dphi_deg, views)
     ends = float(views[points[0]]), float(views[points[-1]])
     return Stretch(sweep.theta_i_deg, dphi, min(ends), max(ends), mean, weight)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from analysis.data.measurements import Measurements
-from instrument.geometry import FloatArray, IntArray
+from instrument.geometry import FloatArray, Geometry, IntArray
 
 _DECIMALS = 3  # degrees equal to this many decimals are one setting
 
@@ -20,8 +21,18 @@ class Sweep(NamedTuple):
     points: IntArray
 
 
-def sweeps(m: Measurements) -> list[Sweep]:
+# Every candidate's residuals are looked at along the same sweeps.
+_found: WeakKeyDictionary[Geometry, tuple[Sweep, ...]] = WeakKeyDictionary()
+
+
+def sweeps(m: Measurements) -> tuple[Sweep, ...]:
     """All sweeps of at least two points, by incidence and plane."""
+    if m.geometry not in _found:
+        _found[m.geometry] = tuple(_sweeps(m))
+    return _found[m.geometry]
+
+
+def _sweeps(m: Measurements) -> list[Sweep]:
     plane, views = plane_and_view(m)
     settings = np.stack([np.round(m.theta_i_deg, _DECIMALS), plane], axis=1)
     values, member = np.unique(settings, axis=0, return_inverse=True)

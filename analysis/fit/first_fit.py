@@ -1,19 +1,21 @@
 """First fit of a model, with the independent uncertainties alone: finds the deepest minimum.
 
 The search starts from every local minimum of a grid, and from the fits of the special cases of the
-model: no fit ends above that of a simpler model which it contains. Nothing here depends on which
+model: no fit ends above that of a simpler model which it contains. Of very many points a part shows
+where the minima are, and each is then followed with all of them. Nothing here depends on which
 other models are compared.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from analysis.data.covariance import independent_covariance
 from analysis.data.measurements import Measurements
+from analysis.data.thinning import thinned
 from analysis.fit.criteria import bic, enough_chi2, variance_floor
 from analysis.fit.relative_scale import FACTOR_NAME, relative_model
 from analysis.fit.search.levenberg_marquardt import HUBER, Minimum
@@ -27,6 +29,15 @@ from instrument.geometry import FloatArray, Geometry
 
 # Local minima of a grid from which the search starts, and of one for MANY points.
 _MAX_STARTS, _STARTS_OF_MANY = 10, 5
+# Points from which on a part of them, so many, shows where the minima are.
+_VERY_MANY, _PART = 4000, 2000
+# A minimum of the part lies off that of all points by its own u: there chi2 is above the minimum by
+# about K / _PART of it. Those that are above the lowest by no more than this fraction are followed.
+_CLOSE, _FOLLOWED = 0.02, 3
+# They are followed until a step lowers chi2 by no more than this, in units of u^2: 0.03 u.
+_RISE = 1e-3
+# Of a rough fit: relative tolerance of chi2, and the most steps.
+_ROUGH_RTOL, _ROUGH_STEPS = 1e-2, 4
 # Iterations in which a robust fit and its estimate of the noise converge.
 _ROBUST_ROUNDS = 3
 # Standard deviation of normal errors over the median of their absolute values.
@@ -38,7 +49,7 @@ class FirstFit:
     """Model fitted with the independent uncertainties alone, without averaging.
 
     model: as it was asked for, without a factor for relative measurements. starts: parameters (K,)
-    of all minima found, the deepest first.
+    of all minima found, the deepest first. rough: its search was not followed to the end.
     """
 
     model: Model
@@ -46,6 +57,7 @@ class FirstFit:
     solution: Minimum
     bic: float
     starts: tuple[FloatArray, ...] = ()
+    rough: bool = False
 
     def brdf(self, geometry: Geometry) -> FloatArray:
         """BRDF of the fitted model in 1/sr, of the shape of the geometry."""
@@ -56,13 +68,20 @@ class FirstFit:
 class FirstFits:
     """First fits to one set of measurements, each made once: models share their special cases.
 
-    made, grids: by name of the model. known: parts of the terms that the grids share.
+    made, grids: by name of the model. known: parts of the terms that the grids share. part: first
+    fits to a part of very many measurements, else None.
     """
 
     measurements: Measurements
     made: dict[str, FirstFit] = field(default_factory=dict)
     grids: dict[str, Grid] = field(default_factory=dict)
     known: Known = field(default_factory=dict)
+    part: FirstFits | None = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        m = self.measurements
+        if m.size > _VERY_MANY:
+            object.__setattr__(self, "part", FirstFits(thinned(m, _PART)))
 
     def of(self, model: Model) -> FirstFit:
         """First fit of a model. Raises `NotDetermined` as `fit` does."""
@@ -70,13 +89,20 @@ class FirstFits:
             self.made[model.name] = self._fit(model)
         return self.made[model.name]
 
+    def roughly(self, model: Model) -> FirstFit:
+        """Fit to the part of very many measurements, followed for a few steps with all of them."""
+        if self.part is None or model.name in self.made:
+            return self.of(model)
+        problem = self._problem(model)
+        (start, *_) = _lowest(problem, self.part.of(model).starts)
+        found = problem.solve(start, rtol=_ROUGH_RTOL, most_steps=_ROUGH_STEPS)
+        own = bic(self.measurements, problem, found)
+        return FirstFit(model, problem, found, own, (found.x,), rough=True)
+
     def _fit(self, model: Model) -> FirstFit:
-        m, grid = self.measurements, self._grid(model)
-        problem = grid.problem
-        count = _MAX_STARTS if m.size < MANY else _STARTS_OF_MANY
-        nodes = grid.minima(problem.covariance, count)
+        m, problem = self.measurements, self._problem(model)
         enough = enough_chi2(m, problem)
-        found = all_minima(problem, nodes, enough)
+        found = self._minima(model, problem, enough)
         clear = found[0].chi2 <= enough and m.size >= MANY
         for x in () if clear else self._special_cases(model, problem):
             if problem.chi2(x) < found[0].chi2 * (1 - LOWER):
@@ -84,19 +110,29 @@ class FirstFits:
         starts = tuple(minimum.x for minimum in found)
         return FirstFit(model, problem, found[0], bic(m, problem, found[0]), starts)
 
-    def _grid(self, model: Model) -> Grid:
+    def _problem(self, model: Model) -> Problem:
+        m = self.measurements
+        fitted = relative_model(model, m.brdf) if m.relative else model
+        _require_points(fitted, m)
+        return Problem(fitted, m.geometry, m.brdf, independent_covariance(m))
+
+    def _minima(self, model: Model, problem: Problem, enough: float) -> list[Minimum]:
+        """Minima of a problem, the deepest first."""
+        if self.part is not None:
+            starts = _lowest(problem, self.part.of(model).starts)
+            atol = _RISE * problem.chi2(starts[0]) / self.measurements.size
+            found = (problem.solve(x, atol=atol) for x in starts)
+            return sorted(found, key=lambda one: one.chi2)
         if model.name not in self.grids:
-            m = self.measurements
-            fitted = relative_model(model, m.brdf) if m.relative else model
-            _require_points(fitted, m)
-            problem = Problem(fitted, m.geometry, m.brdf, independent_covariance(m))
             self.grids[model.name] = Grid.of(problem, self.known)
-        return self.grids[model.name]
+        count = _MAX_STARTS if self.measurements.size < MANY else _STARTS_OF_MANY
+        nodes = self.grids[model.name].minima(problem.covariance, count)
+        return all_minima(problem, nodes, enough)
 
     def _special_cases(self, model: Model, problem: Problem) -> Iterator[FloatArray]:
         """Fits of the special cases of a model, as parameters (K,) of the problem."""
         for case in special_cases(model):
-            first = self.of(case.model)
+            first = self.roughly(case.model)
             names = (p.name for p in first.problem.model.parameters)
             values = dict(zip(names, map(float, first.solution.x), strict=True))
             own = problem.model.parameters
@@ -107,6 +143,13 @@ class FirstFits:
             x = np.array([at[p.name] for p in own])
             if np.all((problem.low <= x) & (x <= problem.high)):
                 yield x
+
+
+def _lowest(problem: Problem, starts: Sequence[FloatArray]) -> list[FloatArray]:
+    """Starts (K,) whose chi2 is close to the lowest of them, the lowest first."""
+    chi2 = [problem.chi2(x) for x in starts]
+    order = sorted(range(len(starts)), key=lambda k: chi2[k])[:_FOLLOWED]
+    return [starts[k] for k in order if chi2[k] <= (1 + _CLOSE) * chi2[order[0]]]
 
 
 def first_fit(model: Model, measurements: Measurements, robust: bool = False) -> FirstFit:

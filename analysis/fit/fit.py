@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -34,7 +34,7 @@ from analysis.fit.scale_ratios import Ratio, scale_ratios
 from analysis.fit.search.levenberg_marquardt import Minimum
 from analysis.fit.search.minima import all_minima, deepest
 from analysis.fit.search.problem import Problem
-from analysis.fit.uncertainty import uncertainty
+from analysis.fit.uncertainty import uncertainty, unknown
 from analysis.models import Model
 from analysis.models.base import Validity
 from instrument.geometry import BoolArray, FloatArray, Geometry
@@ -149,9 +149,12 @@ def refine(
     `first` is the model's fit to the measurements with independent uncertainties. The result is
     that of `fit`, whatever other models are compared: averaging is left out where it hardly matters
     beside the model's own misfit. Without `profiles`, and for a model far from the data, the
-    interval of a parameter without u is its whole domain.
+    interval of a parameter without u is its whole domain. A rough fit stays as it is, without u.
     """
     m = measurements
+    if first.rough:
+        as_it_is = AveragedFit(first.problem, first.solution, averaged=False, converged=True)
+        return _result(m, as_it_is, first.problem.covariance, "none")
     if m.free_levels:
         m = normalise_lamp_levels(m, first.brdf)
         first = FirstFits(m).of(first.model)
@@ -163,7 +166,7 @@ def refine(
     fitted = _averaged(linear, m, acceptance)
     if m.u_random is not None and _rejected(fitted):
         fitted = _widened(linear, fitted, m, acceptance)
-    return _result(m, fitted, linear.problem.covariance, profiles)
+    return _result(m, fitted, linear.problem.covariance, "profiles" if profiles else "linear")
 
 
 class _Linearised(NamedTuple):
@@ -271,7 +274,10 @@ def _averaged(linear: _Linearised, m: Measurements, acceptance: Acceptance | Non
 
 
 def _result(
-    m: Measurements, fitted: AveragedFit, covariance: Covariance, profiles: bool
+    m: Measurements,
+    fitted: AveragedFit,
+    covariance: Covariance,
+    intervals: Literal["profiles", "linear", "none"],
 ) -> FitResult:
     """Result with chi2 and u_total by the stated `covariance`, and u with the misfit as noise."""
     problem, found = replace(fitted.problem, covariance=covariance), fitted.solution
@@ -280,9 +286,11 @@ def _result(
     unscaled = unscaled_parameters(problem.model) if m.relative else frozenset[str]()
     found = found._replace(chi2=problem.chi2(x))
     near = m.u_random is None or reduced_chi2(problem, found) < _FAR_CHI2
-    profiles = profiles and near
-    known = uncertainty(fitted.problem, fitted.solution, noise, unscaled, profiles)
-    ratios = scale_ratios(fitted.problem, fitted.solution, noise, profiles=profiles)
+    profiles = intervals == "profiles" and near
+    known, ratios = unknown(problem), dict[str, Ratio]()
+    if intervals != "none":
+        known = uncertainty(fitted.problem, fitted.solution, noise, unscaled, profiles)
+        ratios = scale_ratios(fitted.problem, fitted.solution, noise, profiles=profiles)
     predicted = problem.predict(x)
     residual = m.brdf - predicted
     scale = math.sqrt(noise) if m.u_random is None and problem.huber is None else 1.0

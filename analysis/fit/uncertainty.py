@@ -77,6 +77,13 @@ def uncertainty(
     return Uncertainty(u, intervals, tuple(undetermined), correlation)
 
 
+def unknown(problem: Problem) -> Uncertainty:
+    """No uncertainty of any parameter."""
+    names = [p.name for p in problem.model.parameters]
+    correlation = np.full((len(names), len(names)), np.nan)
+    return Uncertainty(dict.fromkeys(names), {}, (), correlation)
+
+
 def _bound_dependent(
     problem: Problem, x: FloatArray, variance: float, C: FloatArray, bound: BoolArray
 ) -> BoolArray:

@@ -165,7 +165,7 @@ def _measurements(table: BrdfTable) -> Measurements:
     return Measurements.bare(g.theta_i_deg, g.theta_r_deg, g.dphi_deg, table.brdf)
 
 
-def _sweeps(table: BrdfTable) -> list[Sweep]:
+def _sweeps(table: BrdfTable) -> tuple[Sweep, ...]:
     return sweeps(_measurements(table))
 
 

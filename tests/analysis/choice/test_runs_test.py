@@ -132,7 +132,7 @@ def test_scattered_points_are_reported_with_their_angles(
 ) -> None:
     """As the table has them: theta_r signed or not, dphi below 180 degrees or not."""
     m = Measurements.bare([10.0, 20.0, 30.0], [15.0, theta_r, 25.0], [70.0, dphi, 110.0], 0.2)
-    assert sweeps(m) == []
+    assert sweeps(m) == ()
     (worst,) = worst_stretches(m, np.array([0.1, -9.0, 0.1]))
     assert worst == Stretch(20, named[0], named[1], named[1], -9, 9)
     here = Geometry.from_degrees(theta_i=20, theta_r=worst.from_deg, dphi=worst.dphi_deg)

@@ -1,0 +1,96 @@
+"""Of very many points a part shows the minima, and which models are hopeless: the same choice.
+
+The limits are lowered, so that the whole search is quick enough to compare with; with --slow they
+are the program's own.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from analysis.choice.choice import Choice, choose
+from analysis.data.measurements import Measurements
+from analysis.fit import first_fit
+from analysis.models import MODELS
+from instrument.geometry import Geometry
+
+MATERIALS = ("oren_nayar", "oren_nayar+torrance_sparrow", "lambert+ggx", "minnaert", "wolff")
+# chi2 of a model that is hopeless, over its least; and over that of the best model, from which on
+# its value does not matter.
+MOST_ABOVE, OUT_OF_QUESTION = 1.2, 100.0
+BOUNDED = (1, 4, 6)  # seeds
+FACTOR = 8  # of the number of points, from the program's limits to those of the bounded form
+
+
+def drawn(seed: int, size: int) -> Measurements:
+    """Return points of a random material, every other time one that no model explains."""
+    draw = np.random.default_rng(seed)
+    model = MODELS[MATERIALS[seed % len(MATERIALS)]]
+    values = {
+        p.name: float(np.exp(draw.uniform(np.log(p.starts[0]), np.log(p.starts[-1]))))
+        for p in model.parameters
+    }
+    theta_i = np.repeat(np.arange(5.0, 75.0, 5.0), size // 14 + 1)[:size]
+    theta_r, dphi = draw.uniform(0, 80, size), draw.uniform(0, 180, size)
+    geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
+    brdf = model.brdf(geometry, **values)
+    if seed % 2:
+        brdf *= 1 + 0.1 * np.sin(np.radians(5 * theta_r + 3 * dphi))
+    u = 0.01 * brdf
+    return Measurements.bare(theta_i, theta_r, dphi, brdf + u * draw.standard_normal(size), u)
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A choice with the part of the points, one without, and their time in s of processor."""
+
+    quick: Choice
+    whole: Choice
+    quick_s: float
+    whole_s: float
+
+
+def compared(m: Measurements, very_many: int, part: int, patch: pytest.MonkeyPatch) -> Compared:
+    patch.setattr(first_fit, "_VERY_MANY", very_many)
+    patch.setattr(first_fit, "_PART", part)
+    begun_s = time.process_time()
+    quick = choose(m)
+    quick_s = time.process_time() - begun_s
+    patch.setattr(first_fit, "_VERY_MANY", m.size)
+    begun_s = time.process_time()
+    return Compared(quick, choose(m), quick_s, time.process_time() - begun_s)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_the_choice_is_that_of_a_search_with_all_points(
+    seed: int,
+    slow: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    record_property: Callable[[str, object], None],
+) -> None:
+    very_many, part = first_fit._VERY_MANY, first_fit._PART
+    if not slow and seed not in BOUNDED:
+        pytest.skip("with --slow")
+    if not slow:
+        very_many, part = very_many // FACTOR, part // FACTOR
+    found = compared(drawn(seed, 2 * very_many), very_many, part, monkeypatch)
+    record_property("time of the search with all points", found.whole_s / found.quick_s)
+    quick, whole = found.quick, found.whole
+    assert (quick.chosen, quick.verdict) == (whole.chosen, whole.verdict)
+    assert quick.best is not None
+    assert whole.best is not None
+    for name, u in whole.best.u.items():
+        if u is not None:
+            assert abs(quick.best.values[name] - whole.best.values[name]) < 0.1 * u, name
+    shown = {c.model: c.chi2 or 0.0 for c in quick.candidates}
+    least = min(c.chi2 or 0.0 for c in whole.candidates)
+    for one in whole.candidates:
+        assert one.chi2 is not None
+        if one.chi2 < OUT_OF_QUESTION * least:
+            assert shown[one.model] < MOST_ABOVE * one.chi2, one.model
