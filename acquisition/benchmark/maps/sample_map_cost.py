@@ -37,6 +37,7 @@ _CAMERA = Pinhole(
     axis_column_px=255.5, axis_row_px=239.5, roll_deg=0.0,
 )  # fmt: skip
 _LAMP_MM, _NOISE = 1000.0, 0.01
+_SHARED = 45  # errors that cells share: an angle for each view, lamp, tile, drift
 _SIDES = (16, 32, 64, 128, 256, 480)  # rows of cells; columns in the picture's proportion
 _EXACT = 120  # cells with an exact fit
 _GOAL_S, _GOAL_CELLS = 10.0, 512 * 480
@@ -109,10 +110,12 @@ def _rectified(grid: CellGrid, theta_i: FloatArray, theta_r: FloatArray) -> Cell
     brdf = np.empty((theta_r.size, grid.rows, grid.columns), dtype=np.float32)
     for k, view in enumerate(theta_r.tolist()):
         brdf[k] = np.float32(curve[k]) * rectify(light, grid, _CAMERA, view)
-    zero = np.zeros(theta_r.size)
+    zero, shape = np.zeros(theta_r.size), brdf.shape[1:]
     return CellData(
         brdf=brdf, x_mm=grid.x_mm, y_mm=grid.y_mm, floor=zero, per_brdf=zero,
         relative=np.full(theta_r.size, _NOISE),
+        texture=np.zeros(shape), place_mm=zero, bend=np.zeros(shape), blur=zero,
+        shared=_NOISE * random.standard_normal((theta_r.size, _SHARED)), shared_mm=zero,
     )  # fmt: skip
 
 
