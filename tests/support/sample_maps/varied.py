@@ -56,7 +56,7 @@ class Varied:
             ],
             references=references,
             keep_frames=True,
-            frames_per_point=2,
+            frames_per_point=1,
             simulated_sample=SimulatedSample(
                 model="oren_nayar", parameters=one, variation=variation
             ),

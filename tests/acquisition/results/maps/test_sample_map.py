@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.results.maps.sample_map import map_sample
 from analysis.sample_maps.sample_map import SampleMap
-from instrument.config.protocol import MapsConfig
+from instrument.config.protocol import MapsConfig, Steps
 from instrument.config.simulated.defects import LensDefects
 from instrument.config.uncertainty.rig_lines import RigLines
 from instrument.errors import InputError
@@ -44,7 +44,7 @@ def _inside(found: SampleMap, true: dict[str, np.ndarray], name: str) -> np.ndar
 
 @pytest.mark.parametrize("varied", QUICK, ids=lambda v: v.pattern)
 def test_the_truth_of_a_cell_lies_within_its_u(varied: Varied, tmp_path: Path) -> None:
-    found, loaded = varied.mapped(tmp_path / "run")
+    found, loaded = varied.mapped(tmp_path / "run", 2.7)  # few cells: each has angles of its own
     true = truth(found, loaded)
     assert _inside(found, true, "sigma_deg").mean() > 0.85
     if varied.tile:  # its own error is that of all cells; without, light of two bounces is unknown
@@ -96,9 +96,9 @@ def test_an_even_sample_is_uniform_and_its_model_holds(tmp_path: Path) -> None:
     )
     with Record.create(tmp_path / "run", {}) as record:
         scan(even, record)
-        found = map_sample(record, even, "oren_nayar", 2.0)
+        found = map_sample(record, even, "oren_nayar", 2.7)
         unknown = changed(even, rig={"uncertainty": RigLines(u_vignetting=0.05)})
-        vague = map_sample(record, unknown, "oren_nayar", 2.0)
+        vague = map_sample(record, unknown, "oren_nayar", 2.7)
     assert found.uniform
     # Vignetting that is not known is taken for albedo, by as much as its u says.
     assert not vague.uniform
@@ -115,13 +115,14 @@ def test_an_even_sample_is_uniform_and_its_model_holds(tmp_path: Path) -> None:
 def test_cells_follow_the_plate_where_its_markers_are_seen(tmp_path: Path) -> None:
     loaded = with_plate(Varied("halves", ONE, True, 8).loaded(shrink=2), 1.4, -1.1, 1.0, 0.15)
     (sweep,) = loaded.protocol.sweeps
-    some = changed(loaded, sweeps=[{**sweep, "theta_r_deg": [-60.0, -35.0, -10.0, 15.0, 55.0]}])
-    gathering = changed(some, maps=MapsConfig(cell_mm=2.0))
+    views = {"theta_r_deg": [-60.0, -35.0, -10.0, 15.0, 55.0]}
+    some = changed(loaded, sweeps=[{**sweep, **views}], frames_per_point=1)
+    gathering = changed(some, maps=MapsConfig(cell_mm=2.7))
     with Record.create(tmp_path / "run", {}) as record:
         scan(gathering, record)
-        found = map_sample(record, some, "oren_nayar", 2.0)
-        gathered = map_sample(record, changed(gathering, keep_frames=False), "oren_nayar", 2.0)
-        blind = map_sample(record, changed(some, markers=None), "oren_nayar", 2.0)
+        found = map_sample(record, some, "oren_nayar", 2.7)
+        gathered = map_sample(record, changed(gathering, keep_frames=False), "oren_nayar", 2.7)
+        blind = map_sample(record, changed(some, markers=None), "oren_nayar", 2.7)
     true = truth(found, some)
     for cells in (found, gathered):
         assert _inside(cells, true, "sigma_deg").mean() > 0.85
@@ -135,10 +136,12 @@ def test_cells_follow_the_plate_where_its_markers_are_seen(tmp_path: Path) -> No
 
 def test_a_scan_that_does_not_stop_is_mapped(tmp_path: Path) -> None:
     loaded = Varied("halves", ONE, True, 6).loaded()
-    flown = changed(loaded, motion="fly", frames_per_point=1)
+    (sweep,) = loaded.protocol.sweeps
+    views = {"theta_r_deg": Steps(start=-65.0, stop=65.0, num=9)}
+    flown = changed(loaded, sweeps=[{**sweep, **views}], motion="fly", frames_per_point=1)
     with Record.create(tmp_path / "run", {}) as record:
         scan(flown, record)
-        found = map_sample(record, flown, "oren_nayar", 2.5)
+        found = map_sample(record, flown, "oren_nayar", 2.7)
     assert found.height_mm[0] == pytest.approx(0.15, abs=0.04)
     assert _inside(found, truth(found, flown), "sigma_deg").mean() > 0.85
     assert found.rejected_share < 0.06  # the edge is a twentieth of the cells
@@ -172,26 +175,23 @@ def test_a_run_without_frames_or_with_wrong_ones_is_refused(tmp_path: Path) -> N
 def test_bands_and_cells_gathered_while_scanning_give_the_same_map(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    loaded = Varied("halves", ONE, True, 7).loaded()
-    gathering = changed(loaded, keep_frames=False, maps=MapsConfig(cell_mm=2.5))
-    with Record.create(tmp_path / "gathered", {}) as record:
-        scan(gathering, record)
-        assert not (record.folder / "frames").exists()
+    both = changed(Varied("halves", ONE, True, 7).loaded(), maps=MapsConfig(cell_mm=3.2))
+    loaded, gathering = changed(both, maps=None), changed(both, keep_frames=False)
+    with Record.create(tmp_path / "run", {}) as record:
+        scan(both, record)
+        whole = map_sample(record, loaded, "oren_nayar", 3.2)
         gathered = map_sample(record, gathering, "oren_nayar")
-        with pytest.raises(InputError, match=r"cells of 3 mm asked for, but .* of 2.5 mm"):
+        with pytest.raises(InputError, match=r"cells of 3 mm asked for, but .* of 3.2 mm"):
             map_sample(record, gathering, "oren_nayar", 3.0)
         kept = sorted((record.folder / "cells").iterdir())
         kept[1].write_bytes(kept[1].read_bytes()[:-4])
         with pytest.raises(InputError, match=rf"{kept[1].name}: cannot be read"):
             map_sample(record, gathering, "oren_nayar")
         np.save(kept[1], np.zeros(5))
-        with pytest.raises(InputError, match=r"\(5,\), float64; allowed: 401 32-bit floats"):
+        with pytest.raises(InputError, match=r"\(5,\), float64; allowed: 226 32-bit floats"):
             map_sample(record, gathering, "oren_nayar")
-    with Record.create(tmp_path / "run", {}) as record:
-        scan(loaded, record)
-        whole = map_sample(record, loaded, "oren_nayar", 2.5)
-        monkeypatch.setattr("acquisition.results.maps.sample_map._MOST_BYTES", 4 * 11 * 20 * 6)
-        parts = map_sample(record, loaded, "oren_nayar", 2.5)
+        monkeypatch.setattr("acquisition.results.maps.sample_map._MOST_BYTES", 4 * 11 * 15 * 5)
+        parts = map_sample(record, loaded, "oren_nayar", 3.2)
     assert parts.height_mm == pytest.approx(whole.height_mm)
     # Gathered cells were rectified for a surface on the axis: those on an edge are known worse.
     assert gathered.height_mm[0] == pytest.approx(0.15, abs=2 * gathered.height_mm[1])
@@ -199,4 +199,4 @@ def test_bands_and_cells_gathered_while_scanning_give_the_same_map(
     for name, values in whole.values.items():
         assert parts.values[name] == pytest.approx(values, rel=1e-5, nan_ok=True)
         off = np.abs(gathered.values[name] - values) / np.hypot(gathered.u(name), whole.u(name))
-        assert np.mean(off[np.isfinite(off)] < 1.96) > 0.95
+        assert np.mean(off[np.isfinite(off)] < 1.96) > 0.9
