@@ -23,8 +23,9 @@ from instrument.geometry import FloatArray, Geometry, IntArray
 MAX_ROUNDS = 12
 
 # All in units of the points' independent uncertainty: the least effect of averaging that counts,
-# the change at which the rounds have converged, and the tolerance of the quadrature.
-RELEVANT, CONVERGED, _QUADRATURE = 1 / 3, 0.05, 0.2
+# the change at which the rounds have converged, and the tolerance of the quadrature, whose
+# errors have like sign along a lobe: together they shift its width by a larger part of its u.
+RELEVANT, CONVERGED, _QUADRATURE = 1 / 3, 0.05, 0.02
 
 # Outside these ratios a gain would magnify errors of a nearly vanishing model: then an offset.
 _MIN_GAIN, _MAX_GAIN = 0.1, 5.0

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from analysis.data.acceptance import averaged_brdf
+from analysis.data.measurements import Measurements
 from analysis.fit.fit import fit
 from analysis.models import MODELS
 from tests.support.analysis.seeded_scan import RIG, scan
@@ -20,3 +23,22 @@ def test_averaging_is_applied_only_where_it_matters() -> None:
     for name, value in truth.items():
         assert found.values[name] == pytest.approx(value, abs=4 * (found.u[name] or 0))
     assert not fit(MODELS["lambert"], scan("lambert", 4, acceptance=RIG, albedo=0.8), RIG).averaged
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_averaging_is_so_exact_that_it_shifts_no_parameter_by_a_part_of_its_u(seed: int) -> None:
+    """Values without an error, whose u is that of a good scan."""
+    random = np.random.default_rng(seed)
+    truth = {
+        "albedo": random.uniform(0.2, 0.7),
+        "f0": random.uniform(0.03, 0.06),
+        "alpha": random.uniform(0.25, 0.45),
+    }
+    model, views = MODELS["lambert+ggx"], np.arange(-80.0, 81.0, 12.0)
+    lamps = np.repeat(random.uniform(10.0, 65.0, 2), views.size)
+    angles = (lamps, np.tile(views, 2), np.zeros(lamps.size))
+    exact = averaged_brdf(lambda g: model.brdf(g, **truth), *angles, RIG, 3)
+    found = fit(model, Measurements.bare(*angles, exact, 7e-4 * exact), RIG)
+    assert found.averaged
+    for name, value in truth.items():
+        assert found.values[name] == pytest.approx(value, abs=0.03 * (found.u[name] or 0)), name
