@@ -36,6 +36,7 @@ from instrument.text.quoting import printable
 
 MAX_REPORTED = 200  # mistakes per file; more would scroll the first ones off the screen
 
+_MOST_DISTORTION = 0.2  # as that which is typed by hand
 _MOST_ZERO_DEG = 5.0  # of a calibrated zero from the one typed by hand
 
 AnySection = TypeVar("AnySection", bound=Section)
@@ -216,6 +217,11 @@ def _contradictions(rig: Rig, measured: GeometryCalibration) -> Iterator[str]:
         yield (
             f"of a camera with {width} x {height} pixels; allowed: {camera.width_px} x "
             f"{camera.height_px}"
+        )
+    if not abs(measured.distortion) <= _MOST_DISTORTION:
+        yield (
+            f"distortion {100 * measured.distortion:g} %; allowed: up to "
+            f"{100 * _MOST_DISTORTION:g} %. Calibrate again"
         )
     if measured.sign != axis.sign:
         yield f"of theta_r with sign {measured.sign}; allowed: {axis.sign}. Calibrate again"

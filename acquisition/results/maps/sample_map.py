@@ -178,7 +178,11 @@ class _Mapping:
         protocol, curve = self._loaded.protocol, self._curve
         names = tuple(curve.values)
         if not np.isfinite(maps["chi2"]).any():
-            raise NotDetermined("no cell has more geometries than the model has parameters")
+            unseen = ": two or more markers must be seen in a picture, for it to count"
+            raise NotDetermined(
+                "no cell has more geometries than the model has parameters"
+                + (unseen if protocol.markers is not None else "")
+            )
         return SampleMap(
             title=protocol.name,
             sample=protocol.sample.name,

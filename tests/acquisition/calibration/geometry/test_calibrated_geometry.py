@@ -59,6 +59,10 @@ def test_the_rig_takes_the_values_with_or_without_numbers_of_its_own(
         stated = value if without else BENCH["camera"].get(key)
         assert getattr(rig.typed.camera, key) == stated
     assert rig.uncertainty.u_zero_theta_r_deg == 0.01
+    for wrong in (-35.0, float("nan")):
+        own = {**OWN.quantities, DISTORTION: replace(bent, value=wrong)}
+        with pytest.raises(InputError, match=r"distortion (-35|nan) %; allowed: up to 20 %"):
+            load_rig(rig_file(tmp_path, without=without, quantities=own))
     assert (rig.axes.theta_r.zero_deg, rig.typed.axes.theta_r.zero_deg) == (-0.05, 0.0)
 
 

@@ -10,10 +10,10 @@ import pytest
 
 from acquisition.results.maps.sample_map import map_sample
 from analysis.sample_maps.sample_map import SampleMap
-from instrument.config.protocol import MapsConfig, Steps
+from instrument.config.protocol import MapsConfig, Markers, Steps
 from instrument.config.simulated.defects import LensDefects
 from instrument.config.uncertainty.rig_lines import RigLines
-from instrument.errors import InputError
+from instrument.errors import InputError, NotDetermined
 from instrument.record.record import Record
 from tests.support.plates import with_plate
 from tests.support.sample_maps.varied import Varied, truth
@@ -123,6 +123,9 @@ def test_cells_follow_the_plate_where_its_markers_are_seen(tmp_path: Path) -> No
         found = map_sample(record, some, "oren_nayar", 2.7)
         gathered = map_sample(record, changed(gathering, keep_frames=False), "oren_nayar", 2.7)
         blind = map_sample(record, changed(some, markers=None), "oren_nayar", 2.7)
+        elsewhere = Markers(size_mm=6.0, centres_mm=[[0.0, 3.0], [9.0, 3.0]])
+        with pytest.raises(NotDetermined, match="two or more markers must be seen"):
+            map_sample(record, changed(some, markers=elsewhere), "oren_nayar", 2.7)
     true = truth(found, some)
     for cells in (found, gathered):
         assert _inside(cells, true, "sigma_deg").mean() > 0.85
