@@ -2,8 +2,8 @@
 
 One point of a batch may tell the leading models apart; as many as make up a fifth of the scan are
 for lack of fit, the farthest from all before them; the others lower the u of the parameters asked
-for. Where noise is most of what is left, these take more frames: that costs less than the way to
-another point.
+for. Where noise is most of what is left and the way to a point takes longer than its frames, these
+take more of them.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from acquisition.adaptive.aims import MARGIN, Aims
 from acquisition.adaptive.knowledge import Knowledge
 from acquisition.design.forecast import Forecast
 from analysis.choice.ladder import physics
+from analysis.data.covariance import VIEW
 from analysis.design.information import Information
 from analysis.design.optimal import LACK_OF_FIT, RIVALS, SHARE
 from analysis.design.posterior import Posterior
@@ -30,12 +31,9 @@ from instrument.geometry import BoolArray, FloatArray, IntArray
 MOST = 8
 """Most frames of a point, in units of the protocol's."""
 
+_ALONE = 4  # settings of the lamp, the nearest, at which a batch may stay
+_BEYOND = 1e-3  # weight of a variance that is as small as asked
 _TOLD = 100.0  # chi2, to first order, beyond which a point more need not tell two models apart
-_LEAST = 2  # points of a batch, even where fewer may reach the goal
-_STEP, _SEARCHES = 1.6, 11  # of the search for the best count
-_SMALL = 0.02  # share of a point in units of the largest, below which it is left out
-_ROUNDS = 20  # of the weights, for each count
-_NOTHING = 1e-4  # share in units of the largest, below which a point does not come back
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +61,10 @@ class Costs:
     here_deg: float
     per_deg_s: float
 
-    def alone_s(self, multiples: IntArray) -> FloatArray:
-        """Return the time (N,) in s of points with so many frames (N,), without their ways."""
-        return np.asarray(self.move_s + multiples * self.frames_s)
-
-    def one_more_s(self, batch: BoolArray, multiple: int = 1) -> FloatArray:
+    def one_more_s(self, batch: BoolArray, multiples: IntArray) -> FloatArray:
         """Return the time (N,) in s that each candidate would add to a batch, a mask (N,).
+
+        multiples: frames (N,) of each candidate, as a ratio.
 
         The views of a setting are measured in one go: one between them adds no way of its own.
         """
@@ -79,7 +75,7 @@ class Costs:
             way_s[number] *= not taken.any()
             below, above = ends.min() - self.view_deg[own], self.view_deg[own] - ends.max()
             outside_deg[own] = np.maximum(np.maximum(below, above), 0.0)
-        point_s = self.move_s + multiple * self.frames_s
+        point_s = self.move_s + multiples * self.frames_s
         return np.asarray(point_s + way_s[self.setting] + self.per_deg_s * outside_deg)
 
 
@@ -97,16 +93,23 @@ class NextPoints:
         self._information = every.information
         self._weights = self._information.weights(aims.u, aims.u)
         self._chosen = multiples > 0
-        self._once = self._information.rows
-        own = self._by_frames(1)
-        self._known = own.matrix(self._chosen.astype(np.float64))
-        self._posterior = Posterior(own, self._weights, self._chosen)
+        self._dwell = _best_multiples(self._noise / (1 + self._by_view()), costs)
+        self._posterior = Posterior(self._by_frames(self._dwell), self._weights, self._chosen)
         self._rivals = list(_rivals(known, every))
         self.asked = [n for n in self._information.names if n in aims.u]
 
+    def _by_view(self) -> FloatArray:
+        """Variance (N,) of each value by its view angle's own error, in units of the independent.
+
+        A view that is measured again has it again: no further frames average it.
+        """
+        K = len(self._information.names)
+        own = [k for k, name in enumerate(self._information.errors, K) if name.startswith(VIEW)]
+        return np.asarray(np.square(self._information.rows[:, own]).sum(axis=1))
+
     def u_measured(self, design: BoolArray) -> dict[str, float]:
         """Return the u, in its unit, of each parameter asked for by chosen points, a mask (N,)."""
-        return self._u(self._by_frames(1), design)
+        return self._u(self._by_frames(self._dwell), design)
 
     def u_floor(self) -> dict[str, float]:
         """Return the u, in its unit, by every candidate with the most frames."""
@@ -116,9 +119,9 @@ class NextPoints:
         found = information.u(design.astype(np.float64))
         return {name: found[name] for name in self.asked}
 
-    def _by_frames(self, multiple: int) -> Information:
-        """Information where points that are not chosen yet have so many times the frames."""
-        times = np.where(self._chosen, np.maximum(self._multiples, 1), multiple)
+    def _by_frames(self, multiples: IntArray | int) -> Information:
+        """Information where points that are not chosen yet have so many times the frames, (N,)."""
+        times = np.where(self._chosen, np.maximum(self._multiples, 1), multiples)
         smaller = np.sqrt(self._noise / times + 1 - self._noise)
         rows = self._information.rows / smaller[:, np.newaxis]
         return replace(self._information, rows=rows)
@@ -128,110 +131,93 @@ class NextPoints:
     ) -> tuple[list[Pick], float]:
         """Return up to `size` candidates, of those allowed (N,), with reasons and frames.
 
-        And the logarithm by which they lower the sum of squared u, in units of those wanted, per
-        second. spread: points for lack of fit so far. ratio: factor on the forecast u of each
-        parameter; beyond the goal nothing counts.
+        And the logarithm by which they lower what is missed, per second. spread: points for lack of
+        fit so far. ratio: factor on the forecast u of each; what is beyond the goal hardly counts.
         """
-        times, rate = self._times(size, allowed, ratio)
-        reasons = self._reasons(times)
-        apart = self._telling(allowed & ~self._chosen & (times == 0), allowed & False)
+        batch, rate = self._best(size, allowed & ~self._chosen, self._target(ratio))
+        reasons = self._reasons(batch)
+        apart = self._telling(allowed & ~self._chosen & ~batch, batch)
         if apart is not None:
             reasons[apart] = RIVALS
         self._spread(reasons, spread, allowed)
-        return [Pick(k, why, max(int(times[k]), 1)) for k, why in reasons.items()], rate
+        times = np.where(batch, self._dwell, 1)
+        return [Pick(k, why, int(times[k])) for k, why in reasons.items()], rate
 
-    def _times(
-        self, size: int, allowed: BoolArray, ratio: Mapping[str, float]
-    ) -> tuple[IntArray, float]:
-        """Return the frames (N,) of the best further points, in units of the protocol's, a ratio.
+    def _best(self, size: int, free: BoolArray, target: FloatArray) -> tuple[BoolArray, float]:
+        """Return the best further points, a mask (N,), and the rate of `_batch`.
 
-        Of the best weights of designs that add to what is chosen (`analysis.design.bound`), the
-        count for which u falls most per second, on the way to the goal; 0 for the others.
+        At all settings of the lamp, or at one alone: the way to another takes time.
         """
-        free = allowed & ~self._chosen
-        share, count = free / max(free.sum(), 1), float(_LEAST)
-        target = self._target(ratio)
-        way = math.log(max(self._criterion(np.zeros(free.size, dtype=np.int64)) / target, 1.0))
-        found = [(np.zeros(free.size, dtype=np.int64), -1.0)]
-        for _ in range(_SEARCHES if free.any() else 0):
-            share = self._better(share, count)
-            times = self._pruned(_rounded(share, count, size), target)
-            left = math.log(max(self._criterion(times) / target, 1.0))
-            found.append((times, (way - left) / self._spent_s(times)))
-            if left == 0:
-                break
-            count *= _STEP
-        return max(found, key=lambda pair: pair[1])
+        settings = self._costs.setting
+        near = sorted(np.unique(settings[free]), key=lambda k: self._costs.way_s[k])[:_ALONE]
+        parts = [free, *(free & (settings == k) for k in near)]
+        found = [self._batch(size, part, target) for part in parts if part.any()]
+        return max(found, key=lambda pair: pair[1], default=(free & False, -1.0))
 
-    def _pruned(self, times: IntArray, target: float) -> IntArray:
-        """Return fewer points, with frames (N,) as a ratio, that still reach a sum of squared u.
+    def _batch(self, size: int, free: BoolArray, target: FloatArray) -> tuple[BoolArray, float]:
+        """Return up to `size` of the free points, masks (N,), that are to reach the targets (P,).
+
+        One after the other, each the one that lowers what is missed most. And the logarithm by
+        which they lower it, per second. A batch is as large as it may be: a scan of few batches
+        crosses the range of views seldom.
+        """
+        known, batch = self._posterior.copy(), np.zeros(free.size, dtype=bool)
+        most = min(size, int(free.sum()))
+        while batch.sum() < most and (np.any(known.variance > target) or not batch.any()):
+            missed = _missed(known.variances_with_one_more(), target)
+            point = int(np.argmin(np.where(free & ~batch, missed, np.inf)))
+            known.add(point)
+            batch[point] = True
+        batch = self._pruned(batch, target)
+        before, after = self._posterior.variance, self._variances(batch)
+        gained = math.log(float(_missed(before, target) / _missed(after, target)))
+        return batch, gained / self._spent_s(batch)
+
+    def _pruned(self, batch: BoolArray, target: FloatArray) -> BoolArray:
+        """Return fewer points, a mask (N,), that still reach the targets (P,).
 
         Those go first whose time gains least. Points that do not reach it are returned as they are.
         """
-        if self._criterion(times) > target:
-            return times
-        kept = times.copy()
+        kept, alone_s = batch.copy(), self._costs.move_s + self._dwell * self._costs.frames_s
         while np.count_nonzero(kept) > 1:
-            own = np.flatnonzero(kept)
-            cross, inverse = self._posterior.cross[own], self._inverse(kept)
+            cross, inverse = self._posterior.cross[kept], self._inverse(kept)
             seen = inverse @ cross
-            now = float(self._posterior.criterion - np.sum(cross * seen))
-            lost = np.square(seen).sum(axis=1) / np.maximum(np.diag(inverse), 1e-9)
-            least = int(np.argmin(lost / self._costs.alone_s(kept)[own]))
-            if now + lost[least] > target:
+            now = self._posterior.variance - np.sum(cross * seen, axis=0)
+            without = now + np.square(seen) / np.diag(inverse)[:, np.newaxis]
+            enough = np.all(without <= target, axis=1)
+            if not enough.any():
                 break
-            kept[own[least]] = 0
+            lost = (_missed(without, target) - _missed(now, target)) / alone_s[kept]
+            kept[np.flatnonzero(kept)[int(np.argmin(np.where(enough, lost, np.inf)))]] = False
         return kept
 
-    def _inverse(self, times: IntArray) -> FloatArray:
-        """Inverse covariance (M, M) of the readings of M further points, with frames (N,).
+    def _inverse(self, batch: BoolArray) -> FloatArray:
+        """Inverse covariance (M, M) of the readings of the M points of a batch, a mask (N,).
 
         In units of their independent u, and before they are measured (Woodbury).
         """
-        own = np.flatnonzero(times)
-        noise = np.diag(1 / self._information_of(times)[own])
-        return np.asarray(np.linalg.inv(self._posterior.predicted[np.ix_(own, own)] + noise))
+        return np.asarray(
+            np.linalg.inv(np.eye(batch.sum()) + self._posterior.predicted[np.ix_(batch, batch)])
+        )
 
-    def _information_of(self, times: IntArray) -> FloatArray:
-        """Weights (N,) of further points in the information, as a ratio: what frames average."""
-        averaged = self._noise / np.maximum(times, 1) + 1 - self._noise
-        return np.where(times > 0, 1 / averaged, 0.0)
+    def _target(self, ratio: Mapping[str, float]) -> FloatArray:
+        """Return the squared u (P,), in units of those wanted, at which each may be reached."""
+        return np.array([(MARGIN / ratio[name]) ** 2 for name in self.asked])
 
-    def _target(self, ratio: Mapping[str, float]) -> float:
-        """Return the sum of squared u, in units of those wanted, at which each may be reached."""
-        return sum((MARGIN / ratio[name]) ** 2 for name in self.asked)
+    def _variances(self, batch: BoolArray) -> FloatArray:
+        """Return the squared u (P,) of the parameters, in units of those wanted, with a batch."""
+        cross = self._posterior.cross[batch]
+        return np.asarray(
+            self._posterior.variance - np.sum(cross * (self._inverse(batch) @ cross), axis=0)
+        )
 
-    def _better(self, share: FloatArray, count: float) -> FloatArray:
-        """Improve the shares (N,), of a sum of 1 and as a ratio, of a design of so many points."""
-        aims = np.diag(np.sqrt(self._weights))[:, self._weights > 0]
-        used = np.flatnonzero(share > _NOTHING * share.max())
-        rows, own = self._once[used], share[used]
-        for _ in range(_ROUNDS):
-            matrix = self._known + (rows * (count * own)[:, np.newaxis]).T @ rows
-            own = own * np.sqrt(np.square(rows @ np.linalg.solve(matrix, aims)).sum(axis=1))
-            own = own / own.sum()
-        found = np.zeros(share.size)
-        found[used] = own
-        return found
-
-    def _parts(self, times: IntArray) -> dict[str, float]:
-        """Return the u of each parameter in units of that wanted, with further frames (N,)."""
-        cross = self._posterior.cross[np.flatnonzero(times)]
-        variance = self._posterior.variance - np.sum(cross * (self._inverse(times) @ cross), axis=0)
-        return dict(zip(self.asked, np.sqrt(variance).tolist(), strict=True))
-
-    def _criterion(self, times: IntArray) -> float:
-        return sum(part**2 for part in self._parts(times).values())
-
-    def _reasons(self, times: IntArray) -> dict[int, str]:
+    def _reasons(self, batch: BoolArray) -> dict[int, str]:
         """Return the parameter that each further point is for: whose variance it lowers most."""
-        once = (times > 0).astype(np.int64)
-        own = np.flatnonzero(once)
-        part = np.square(self._inverse(once) @ self._posterior.cross[own])
-        variance = np.square([*self._parts(once).values()])
+        part = np.square(self._inverse(batch) @ self._posterior.cross[batch])
+        part = part / self._variances(batch)
         return {
             int(k): self.asked[int(np.argmax(row))]
-            for k, row in zip(own, part / variance, strict=True)
+            for k, row in zip(np.flatnonzero(batch), part, strict=True)
         }
 
     def _spread(self, reasons: dict[int, str], spread: int, allowed: BoolArray) -> None:
@@ -244,19 +230,19 @@ class NextPoints:
                 return
             taken[far], reasons[far], spread = True, LACK_OF_FIT, spread + 1
 
-    def _spent_s(self, times: IntArray) -> float:
-        """Return the time of further points with so many frames (N,), as a ratio."""
-        batch, spent_s = np.zeros(self._chosen.size, dtype=bool), 0.0
-        for point in np.flatnonzero(times):
-            spent_s += float(self._costs.one_more_s(batch, int(times[point]))[point])
-            batch[point] = True
+    def _spent_s(self, batch: BoolArray) -> float:
+        """Return the time of a batch, a mask (N,), with the best numbers of frames."""
+        so_far, spent_s = np.zeros(batch.size, dtype=bool), 0.0
+        for point in np.flatnonzero(batch):
+            spent_s += float(self._costs.one_more_s(so_far, self._dwell)[point])
+            so_far[point] = True
         return spent_s
 
     def _telling(self, free: BoolArray, batch: BoolArray) -> int | None:
         """Return the candidate that tells the closest rival best; None where all are told apart."""
         if not free.any():
             return None
-        seconds = self._costs.one_more_s(batch)
+        seconds = self._costs.one_more_s(batch, np.ones(batch.size, dtype=np.int64))
         for rival in self._rivals:
             best = rival.best(self._chosen)
             if best.chi2 < _TOLD:
@@ -265,16 +251,25 @@ class NextPoints:
         return None
 
 
-def _rounded(share: FloatArray, count: float, size: int) -> IntArray:
-    """Return whole numbers of frames (N,), as a ratio, for the `size` largest shares (N,) at most.
+def _missed(variance: FloatArray, target: FloatArray) -> FloatArray:
+    """Sum (...) over parameters of their variances (..., P) in units of the targets (P,).
 
-    What the smaller ones would have is theirs.
+    Beyond its target a parameter hardly counts.
     """
-    largest = np.argsort(-share, kind="stable")[:size]
-    kept = largest[share[largest] >= _SMALL * share[largest[0]]]
-    times = np.zeros(share.size, dtype=np.int64)
-    times[kept] = np.clip(np.round(count * share[kept] / share[kept].sum()), 1, MOST)
-    return times
+    share = variance / target
+    return np.asarray((np.maximum(share, 1.0) + _BEYOND * share).sum(axis=-1))
+
+
+def _best_multiples(noise: FloatArray, costs: Costs) -> IntArray:
+    """Frames (N,) of the points, in units of the protocol's, that teach most per second.
+
+    noise: (N,), part p of the variance that frames average. With a way of w and frames of f
+    seconds, the variance p / m + 1 - p times the time w + m f is least at m^2 = p w / ((1 - p) f)
+    (Cochran 1977, section 10.6, for stages of a sample).
+    """
+    rest = np.maximum(1 - noise, 1e-9) * np.maximum(costs.frames_s, 1e-9)
+    best = np.sqrt(noise * costs.move_s / rest)
+    return np.asarray(np.clip(np.round(best), 1, MOST), dtype=np.int64)
 
 
 def _rivals(known: Knowledge, every: Forecast) -> Iterator[Rival]:

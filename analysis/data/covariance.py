@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     Columns = FloatArray | csr_array
 
 LAMP_LEVEL, ANGLES = "lamp level", "angle setting"
+VIEW = "theta_r"
+"""Name of the errors of view angles, before the angle of each."""
 
 _MAX_DENSE = 100_000  # entries of a dense array; larger ones are mostly zeros, so sparse
 # A model may be steeper than the data between neighbours by this factor: at the flank of a lobe of
@@ -211,7 +213,7 @@ def _shifts(
     f = brdf(m.geometry)
     unlimited, limit = np.full(m.size, np.inf), _view_limit(m)
     angles: tuple[tuple[str, dict[str, float], FloatArray, IntArray | FloatArray], ...] = (
-        ("theta_r", {"theta_r": m.u_theta_r_deg}, limit, m.theta_r_deg),
+        (VIEW, {"theta_r": m.u_theta_r_deg}, limit, m.theta_r_deg),
         ("theta_i, lamp setting", {"theta_i": m.u_theta_i_deg}, unlimited, m.lamp_setting),
         ("dphi, lamp setting", {"dphi": m.u_dphi_deg}, unlimited, m.lamp_setting),
     )

@@ -7,6 +7,7 @@ more or less changes that by one product of a column with itself (Sherman and Mo
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -39,6 +40,12 @@ class Posterior:
         self.chosen = self.chosen.copy()
         self._compute()
 
+    def copy(self) -> Posterior:
+        """The same, to be changed by itself."""
+        other = copy(self)
+        other.chosen = self.chosen.copy()
+        return other
+
     def _compute(self) -> None:
         root = self.information.root(self.chosen.astype(np.float64))
         asked = np.flatnonzero(self.weights)
@@ -55,8 +62,12 @@ class Posterior:
 
     def with_one_more(self) -> FloatArray:
         """Criterion (N,), in its own unit, with each candidate added."""
+        return np.asarray(self.variances_with_one_more().sum(axis=1))
+
+    def variances_with_one_more(self) -> FloatArray:
+        """Variances (N, P), in their own unit, with each candidate added."""
         spread = 1 + np.maximum(np.diag(self.predicted), 0.0)
-        return np.asarray(self.criterion - np.square(self.cross).sum(axis=1) / spread)
+        return np.asarray(self.variance - np.square(self.cross) / spread[:, np.newaxis])
 
     def without(self, point: int) -> FloatArray:
         """Variances (P,), in their own unit, without one of the points of the design."""

@@ -1,15 +1,20 @@
 """Bench time beside the even sweep of 5 degrees, for the same u of sigma and the same errors.
 
-Homing, the operator's swaps, darks and readings of tile and lamp are in neither time. Measured on
-the demonstration's rig, with 23 samples: for the u of all 96 points of the sweep the median of the
-ratio is 0.99 (0.66 to 1.74), 55 points; 21 of 23 of the sigma lie within 1.96 u, as those of the
-sweep; the right model each time, in both. For three times that u it is 0.28 to 0.34, with 11 to 13
-points. Noise is small on that rig, so that no point can stand for many, and most of a point's time
-is its way.
+Homing, the operator's swaps, darks and readings of tile and lamp are in neither time. Measured with
+nine samples (those of the paper, four random ones); `SAMPLES` is how many a whole run takes:
+
+- On the demonstration's rig, for the u of all 96 points of the sweep: median of the ratio 0.90
+  (0.86 to 1.03), 53 points. For three times that u 0.31 (0.28 to 0.32), 11 to 13 points. Noise is
+  small there, so that no point can stand for many, and most of a point's time is its way: to cross
+  the views at three incidences once takes 0.15 of the sweep's time.
+- In dim light, where the time is that of exposures: 0.50 (0.33 to 0.69; 1.67 for one sample, whose
+  u its own scatter had widened beyond that of the sweep), for twice the u of the sweep 0.17.
+- The right model each time.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +24,22 @@ from acquisition.adaptive import course
 from acquisition.adaptive.aims import Aims
 from analysis.choice.ladder import physics
 from instrument.config.load import Loaded
+from instrument.config.protocol import FitConfig
 from instrument.record.reading import Rows
-from tests.support.adaptive.against_sweep import PAPER, Compared, compared, quick_fit, random_sample
+from tests.support.adaptive.against_sweep import (
+    PAPER,
+    Compared,
+    Sample,
+    compared,
+    in_dim_light,
+    quick_fit,
+    random_sample,
+    summary,
+)
+from tests.support.scans import changed
+
+SAMPLES = 200
+"""Samples of a whole run; the first ones are those of the paper, the others random."""
 
 
 @pytest.fixture
@@ -35,18 +54,36 @@ def without_acceptance(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(course, "full_fit", full_fit)
 
 
+@pytest.fixture
+def record(record_testsuite_property: Callable[[str, object], None]) -> Callable[..., None]:
+    def made(what: str, found: Sequence[Compared]) -> None:
+        record_testsuite_property(what, summary(found))
+
+    return made
+
+
+def _samples(count: int) -> list[tuple[int, Sample]]:
+    own = [*PAPER.values(), *(random_sample(k) for k in range(len(PAPER), count))]
+    return list(enumerate(own[:count]))
+
+
+def _right(one: Compared) -> bool:
+    return physics(one.adaptive.model) == physics(one.sample[0])
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("without_acceptance")
 def test_the_same_u_takes_less_time_and_the_model_is_found_as_often(
-    tmp_path: Path, slow: bool
+    tmp_path: Path, slow: bool, record: Callable[..., None]
 ) -> None:
-    samples = [*PAPER.values(), *(random_sample(k) for k in range(5, 40))]
-    chosen = list(enumerate(samples)) if slow else [(3, samples[3])]
+    chosen = _samples(SAMPLES) if slow else [(3, PAPER["E"])]
     found = [compared(sample, k, tmp_path / str(k)) for k, sample in chosen]
+    record("adaptive scans beside the sweep", found)
     ratios = [one.ratio for one in found]
-    assert np.median(ratios) < 1.15
+    assert np.median(ratios) < (1.0 if slow else 1.15)
     assert max(ratios) < 2.0
-    assert sum(map(_right, found)) >= 0.8 * len(found)
+    right, by_sweep = (sum(map(test, found)) for test in (_right, _right_by_sweep))
+    assert right >= by_sweep - 2 * np.sqrt(len(found))
     for one in found:
         assert one.end.startswith(("the goal is reached", "no more bench time", "every candidate"))
         if one.end.startswith("the goal is reached"):
@@ -57,16 +94,33 @@ def test_the_same_u_takes_less_time_and_the_model_is_found_as_often(
     assert np.mean(np.abs(off) < 1.96) > 0.8 or len(off) < 10
 
 
+def _right_by_sweep(one: Compared) -> bool:
+    return physics(one.sweep.model) == physics(one.sample[0])
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("without_acceptance")
 def test_three_times_the_u_of_the_sweep_takes_a_third_of_its_time(
-    tmp_path: Path, slow: bool
+    tmp_path: Path, slow: bool, record: Callable[..., None]
 ) -> None:
-    samples = list(PAPER.values()) if slow else [PAPER["A"]]
-    found = [compared(s, k, tmp_path / str(k), times=3.0) for k, s in enumerate(samples)]
-    assert max(one.ratio for one in found) < 0.4
-    assert all(map(_right, found))
+    chosen = _samples(SAMPLES) if slow else [(0, PAPER["A"])]
+    found = [compared(s, k, tmp_path / str(k), times=3.0) for k, s in chosen]
+    record("three times the u of the sweep", found)
+    ratios = [one.ratio for one in found]
+    assert np.median(ratios) < 0.35
+    assert max(ratios) < 0.4 or slow
+    assert np.mean([*map(_right, found)]) > 0.8
 
 
-def _right(one: Compared) -> bool:
-    return physics(one.adaptive.model) == physics(one.sample[0])
+@pytest.mark.slow
+@pytest.mark.usefixtures("without_acceptance")
+def test_where_exposures_are_long_the_same_u_takes_half_the_time(
+    tmp_path: Path, slow: bool, record: Callable[..., None]
+) -> None:
+    plain = in_dim_light()
+    if not slow:  # the right model alone: its fit is quick
+        plain = changed(plain, fit=FitConfig(models=["oren_nayar+torrance_sparrow"]))
+    chosen = _samples(SAMPLES) if slow else [(2, PAPER["D"])]
+    found = [compared(s, k, tmp_path / str(k), plain=plain) for k, s in chosen]
+    record("the same u in dim light", found)
+    assert np.median([one.ratio for one in found]) < 0.65

@@ -18,6 +18,7 @@ from acquisition.results.reduction import reduced_rows
 from analysis.choice.choice import Choice, choose
 from analysis.choice.ladder import physics
 from instrument.config.load import Loaded
+from instrument.geometry import Brdf
 from instrument.record.reading import Rows, batches_of
 from tests.support.adaptive.predicted_bench import PredictedBench
 from tests.support.random_plans import base
@@ -77,6 +78,24 @@ class Compared:
         return self.adaptive.seconds / self.sweep.seconds
 
 
+def summary(found: Sequence[Compared]) -> dict[str, float]:
+    """Figures of a study: ratios of time, points, models that were right, intervals that hold."""
+    ratios = [one.ratio for one in found]
+    kinds = {"adaptive": [one.adaptive for one in found], "sweep": [one.sweep for one in found]}
+    figures = {
+        "samples": len(found),
+        "median ratio": float(np.median(ratios)),
+        "largest ratio": max(ratios),
+        "median points": float(np.median([one.adaptive.points for one in found])),
+        "goal reached": sum(one.end.startswith("the goal is reached") for one in found),
+    }
+    for name, scans in kinds.items():
+        off = [scan.deviation for scan in scans if scan.deviation is not None]
+        figures[f"right model, {name}"] = len(off)
+        figures[f"within 1.96 u, {name}"] = sum(abs(one) < 1.96 for one in off)
+    return figures
+
+
 def five_degrees() -> Loaded:
     """The demonstration: three incidences, 33 views from -80 to 80 degrees."""
     return changed(base("bench_12bit"))
@@ -88,16 +107,37 @@ def quick_fit(rows: Rows, loaded: Loaded) -> Choice:
     return choose(m, None, loaded.protocol.fit.models, method="functional")
 
 
-def compared(sample: Sample, seed: int, folder: Path, times: float = 1.0) -> Compared:
+def in_dim_light() -> Loaded:
+    """The same with a lamp so dim that exposures are long, 8 bits, and a patch of 4 mm.
+
+    As with a narrow filter before the lamp: the time of a point is that of its frames, and noise
+    is most of its u.
+    """
+    bright = five_degrees()
+    camera = bright.rig.camera.model_copy(update={"bit_depth": 8})
+    lamp = bright.rig.lamp.model_copy(update={"white_electrons_per_s": 4000.0})
+    patch = bright.protocol.window.model_copy(update={"width_mm": 4.0, "height_mm": 4.0})
+    return changed(bright, rig={"camera": camera, "lamp": lamp}, window=patch)
+
+
+def compared(
+    sample: Sample,
+    seed: int,
+    folder: Path,
+    times: float = 1.0,
+    plain: Loaded | None = None,
+    extra: Brdf | None = None,
+) -> Compared:
     """Measure a sample in both ways, with the same errors of the bench.
 
     The goal is so many `times` the u of sigma that the sweep's fit states; without one, of the
-    albedo.
+    albedo. plain: the sweep's protocol and rig, those of the demonstration if not given. extra:
+    what the sample's BRDF has beyond its model, in 1/sr.
     """
-    plain = five_degrees()
-    sweep, name, wanted = _swept(plain, sample, seed)
+    plain = five_degrees() if plain is None else plain
+    sweep, name, wanted = _swept(plain, sample, seed, extra)
     listed = candidate_list(with_goal(plain, f"{name}={times * wanted!r}", None))
-    bench = PredictedBench(listed, seed, sample)
+    bench = PredictedBench(listed, seed, sample, extra=extra)
     with bench.create(folder) as record:
         known = bench.run(record).known
         end = batches_of(record.events())[-1].end
@@ -106,10 +146,12 @@ def compared(sample: Sample, seed: int, folder: Path, times: float = 1.0) -> Com
     return Compared(sample=sample, sweep=sweep, adaptive=adaptive, end=end)
 
 
-def _swept(plain: Loaded, sample: Sample, seed: int) -> tuple[Scanned, str, float]:
+def _swept(
+    plain: Loaded, sample: Sample, seed: int, extra: Brdf | None
+) -> tuple[Scanned, str, float]:
     plan = make_plan(plain)
     chooser = Chooser(Layout(plan, plain), Aims(u={}, budget_s=None, models=None, method="auto"))
-    bench = PredictedBench(plain, seed, sample, chooser)
+    bench = PredictedBench(plain, seed, sample, chooser, extra)
     choice = quick_fit(Rows(bench.all_readings(), (), ()), plain)
     best = choice.best
     if best is None:

@@ -22,7 +22,7 @@ from acquisition.results.run_folder import run_meta
 from analysis.models import MODELS
 from instrument.config.load import Loaded
 from instrument.config.protocol import FitConfig
-from instrument.geometry import FloatArray, Geometry
+from instrument.geometry import Brdf, FloatArray, Geometry
 from instrument.record.reading import Reading
 from instrument.record.record import Record
 from tests.support.random_plans import base
@@ -54,7 +54,10 @@ def adaptive_scan(
 
 
 class PredictedBench:
-    """Bench that measures the steps of a list of candidates; `seed`: of all its errors."""
+    """Bench that measures the steps of a list of candidates; `seed`: of all its errors.
+
+    extra: what the sample's BRDF has beyond its model, in 1/sr.
+    """
 
     def __init__(
         self,
@@ -62,10 +65,12 @@ class PredictedBench:
         seed: int = 0,
         sample: tuple[str, Mapping[str, float]] = SAMPLE,
         chooser: Chooser | None = None,
+        extra: Brdf | None = None,
     ) -> None:
         self.loaded, self._seed = loaded, seed
         self.plan = make_plan(loaded)
         self.chooser = chooser or chooser_of(loaded, self.plan)
+        self._extra = extra
         self._model, self._parameters = MODELS[sample[0]], dict(sample[1])
         self._predicted = PredictedReadings(loaded, self.plan).of(self._brdf)
 
@@ -104,7 +109,8 @@ class PredictedBench:
         return replace(drawn, time_s=end_s, free_s=end_s)
 
     def _brdf(self, geometry: Geometry) -> FloatArray:
-        return np.asarray(self._model.brdf(geometry, **self._parameters))
+        own = self._model.brdf(geometry, **self._parameters)
+        return np.asarray(own if self._extra is None else own + self._extra(geometry))
 
     def _random(self, *key: object) -> float:
         """Return a draw of a standard normal distribution for a key, the same each time."""
