@@ -8,7 +8,7 @@ other models are compared.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -31,9 +31,12 @@ from instrument.geometry import FloatArray, Geometry
 _MAX_STARTS, _STARTS_OF_MANY = 10, 5
 # Points from which on a part of them, so many, shows where the minima are.
 _VERY_MANY, _PART = 4000, 2000
+# Minima of the part whose chi2 there is above the lowest by no more than this fraction may be the
+# deepest of all points; so many of them are looked at.
+_NEAR, _LOOKED_AT = 0.1, 3
 # A minimum of the part lies off that of all points by its own u: there chi2 is above the minimum by
 # about K / _PART of it. Those that are above the lowest by no more than this fraction are followed.
-_CLOSE, _FOLLOWED = 0.02, 3
+_CLOSE = 0.02
 # They are followed until a step lowers chi2 by no more than this, in units of u^2: 0.03 u.
 _RISE = 1e-3
 # Of a rough fit: relative tolerance of chi2, and the most steps.
@@ -94,7 +97,7 @@ class FirstFits:
         if self.part is None or model.name in self.made:
             return self.of(model)
         problem = self._problem(model)
-        (start, *_) = _lowest(problem, self.part.of(model).starts)
+        (start, *_) = _lowest(problem, self.part.of(model))
         found = problem.solve(start, rtol=_ROUGH_RTOL, most_steps=_ROUGH_STEPS)
         own = bic(self.measurements, problem, found)
         return FirstFit(model, problem, found, own, (found.x,), rough=True)
@@ -119,7 +122,7 @@ class FirstFits:
     def _minima(self, model: Model, problem: Problem, enough: float) -> list[Minimum]:
         """Minima of a problem, the deepest first."""
         if self.part is not None:
-            starts = _lowest(problem, self.part.of(model).starts)
+            starts = _lowest(problem, self.part.of(model))
             atol = _RISE * problem.chi2(starts[0]) / self.measurements.size
             found = (problem.solve(x, atol=atol) for x in starts)
             return sorted(found, key=lambda one: one.chi2)
@@ -132,6 +135,8 @@ class FirstFits:
     def _special_cases(self, model: Model, problem: Problem) -> Iterator[FloatArray]:
         """Fits of the special cases of a model, as parameters (K,) of the problem."""
         for case in special_cases(model):
+            if self.part is not None and not _near(self.part.of(case.model), self.part.of(model)):
+                continue
             first = self.roughly(case.model)
             names = (p.name for p in first.problem.model.parameters)
             values = dict(zip(names, map(float, first.solution.x), strict=True))
@@ -145,10 +150,19 @@ class FirstFits:
                 yield x
 
 
-def _lowest(problem: Problem, starts: Sequence[FloatArray]) -> list[FloatArray]:
-    """Starts (K,) whose chi2 is close to the lowest of them, the lowest first."""
+def _near(one: FirstFit, other: FirstFit) -> bool:
+    """True if the chi2 of one fit is above that of another by a small part, or below it."""
+    return one.solution.chi2 <= (1 + _NEAR) * other.solution.chi2
+
+
+def _lowest(problem: Problem, in_part: FirstFit) -> list[FloatArray]:
+    """Minima (K,) of the fit to a part whose chi2 is close to the lowest, the lowest first."""
+    most = (1 + _NEAR) * in_part.solution.chi2
+    starts = [x for x in in_part.starts[:_LOOKED_AT] if in_part.problem.chi2(x) <= most]
+    if len(starts) < 2:
+        return [in_part.solution.x]
     chi2 = [problem.chi2(x) for x in starts]
-    order = sorted(range(len(starts)), key=lambda k: chi2[k])[:_FOLLOWED]
+    order = sorted(range(len(starts)), key=lambda k: chi2[k])
     return [starts[k] for k in order if chi2[k] <= (1 + _CLOSE) * chi2[order[0]]]
 
 
