@@ -21,6 +21,8 @@ from analysis.choice.choice import Choice, choose
 from analysis.choice.fit_json import no_fit_json, to_json
 from analysis.choice.ladder import METHODS, MethodOfFit, method_named
 from analysis.fit.fit import FitResult
+from analysis.models.smooth.fresnel_lobe import out_of_plane
+from instrument.config.protocol_checks import through_polariser
 from instrument.errors import InputError, NotDetermined
 
 _MOST_ROWS = 12  # of the table of candidates
@@ -52,6 +54,7 @@ def fit_source(
             source = read_source(path, wanted)
         if names is None and way == "auto":
             names, way = source.fit.models, source.fit.method
+        names = _seen(names, source)
         try:
             choice = _choice(source, names, robust, way)
         except NotDetermined as error:
@@ -66,6 +69,22 @@ def fit_source(
     if folder is not None:
         _write(folder, path, source, choice, found)
     require_result(found, str(path))
+
+
+def _seen(names: Sequence[str] | None, source: Source) -> list[str] | None:
+    """Names of the models as a run's polariser shows them.
+
+    Raises `InputError` where a polariser's angle has no meaning at the source's geometries.
+    """
+    angle_deg = source.polariser_deg
+    if names is None or angle_deg is None:
+        seen = None if names is None else list(names)
+    else:
+        seen = [through_polariser(name, angle_deg) for name in names]
+    text = out_of_plane(seen or (), source.measurements.geometry)
+    if text is not None:
+        raise InputError(text)
+    return seen
 
 
 def _choice(

@@ -43,7 +43,8 @@ class Source:
     """Measurements, the rig's acceptance if it is known, and remarks: points left out, assumptions.
 
     fit: the models and the method that a run's protocol names. sample, tile: name of a run's sample
-    and its white tile, empty and None where they are not known.
+    and its white tile, empty and None where they are not known. polariser_deg: angle of a run's
+    polariser before the camera from the plane of incidence, None without one.
     """
 
     measurements: Measurements
@@ -52,6 +53,7 @@ class Source:
     fit: FitConfig = field(default_factory=FitConfig)
     sample: str = ""
     tile: WhiteTile | None = None
+    polariser_deg: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,7 +157,8 @@ def _run(path: Path) -> Source:
         raise NotDetermined(str(error)) from None
     protocol = loaded.protocol
     tile = protocol.references.white_tile
-    return Source(found, acceptance, notes, protocol.fit, protocol.sample.name, tile)
+    angle_deg = protocol.polariser_deg
+    return Source(found, acceptance, notes, protocol.fit, protocol.sample.name, tile, angle_deg)
 
 
 def _read(path: Path, kind: str, wanted: Wanted) -> Source:

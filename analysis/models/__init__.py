@@ -1,7 +1,8 @@
 """Reflectance models by name: `MODELS["oren_nayar"].brdf(geometry, albedo=0.9, sigma_deg=30)`.
 
 A sum is written with `+`: `MODELS["oren_nayar+torrance_sparrow"]`; a parameter name that its parts
-share (`sigma_deg`) is one parameter of the sum. Open `base` first: it defines a `Model`; the other
+share (`sigma_deg`) is one parameter of the sum. `fresnel_lobe@30` is the lobe that a polariser
+at 30 degrees from the plane of incidence shows. Open `base` first: it defines a `Model`; the other
 modules, and those in `rough`, `smooth` and `specular`, hold the formulas.
 """
 
@@ -18,6 +19,7 @@ from analysis.models.minnaert import MINNAERT
 from analysis.models.rough.oren_nayar import OREN_NAYAR, OREN_NAYAR_QUALITATIVE
 from analysis.models.rough.oren_nayar_exact import OREN_NAYAR_EXACT
 from analysis.models.single_scattering import SINGLE_SCATTERING
+from analysis.models.smooth.fresnel_lobe import FRESNEL_LOBE, lobe_through_polariser
 from analysis.models.smooth.wolff import WOLFF
 from analysis.models.smooth.wolff_oren_nayar import WOLFF_OREN_NAYAR
 from analysis.models.specular.beckmann_spizzichino import BECKMANN_SPIZZICHINO
@@ -41,6 +43,7 @@ _ALL = (
     WOLFF_OREN_NAYAR,
     TORRANCE_SPARROW,
     TORRANCE_SPARROW_LOBE,
+    FRESNEL_LOBE,
     BECKMANN_SPIZZICHINO,
     SPIKE_AND_LOBE,
     UNIFIED,
@@ -68,7 +71,8 @@ class _Models(Mapping[str, Model]):
 @cache
 def _named(name: str) -> Model:
     parts = name.split("+")
-    unknown = [part for part in parts if part not in _SINGLE]
+    single = {part: _single(part) for part in parts}
+    unknown = [part for part, model in single.items() if model is None]
     if unknown:
         near = get_close_matches(unknown[0].lower().replace("-", "_"), _SINGLE, n=1)
         meant = f"did you mean {near[0]}? " if near else ""
@@ -78,7 +82,16 @@ def _named(name: str) -> Model:
         )
     if len(set(parts)) < len(parts):
         raise KeyError(f"a model stands twice in {name!r}; allowed: each model once in a sum")
-    return _SINGLE[name] if len(parts) == 1 else add(*(_SINGLE[part] for part in parts))
+    found = [model for model in single.values() if model is not None]
+    return found[0] if len(found) == 1 else add(*found)
+
+
+def _single(name: str) -> Model | None:
+    """Model of one name, also of a lobe through a polariser: `fresnel_lobe@30`."""
+    lobe, at, angle = name.partition("@")
+    if at and lobe == FRESNEL_LOBE.name:
+        return lobe_through_polariser(angle)
+    return _SINGLE.get(name)
 
 
 MODELS: Mapping[str, Model] = _Models()

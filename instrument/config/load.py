@@ -25,7 +25,12 @@ from instrument.calibration.geometry_file import (
 from instrument.calibration.tile_file import read_tile_table
 from instrument.config.file_role import wrong_role
 from instrument.config.protocol import Protocol
-from instrument.config.protocol_checks import ModelCheck, own_mistakes, rig_mistakes
+from instrument.config.protocol_checks import (
+    ModelCheck,
+    own_mistakes,
+    rig_mistakes,
+    through_polariser,
+)
 from instrument.config.rig import Rig
 from instrument.config.schema_words import Explanation
 from instrument.config.section import Section
@@ -123,7 +128,7 @@ def load_protocol(
     if protocol is None or rig is None or rig_file is None or any(f.found for f in files):
         raise InputError(*_report(*files))
     return Loaded(
-        protocol=protocol,
+        protocol=_with_polariser(protocol),
         protocol_path=path,
         protocol_text=file.marked.text,
         rig=rig,
@@ -182,6 +187,19 @@ def _with_tile_table(file: _File, protocol: Protocol, path: Path | None) -> Prot
         return protocol
     references = protocol.references.model_copy(update={"white_tile": whole})
     return protocol.model_copy(update={"references": references})
+
+
+def _with_polariser(protocol: Protocol) -> Protocol:
+    """Return the protocol with the lobes of its models as its polariser shows them."""
+    angle_deg, sample, fit = protocol.polariser_deg, protocol.simulated_sample, protocol.fit
+    if angle_deg is None:
+        return protocol
+    if sample is not None:
+        model = through_polariser(sample.model, angle_deg)
+        sample = sample.model_copy(update={"model": model})
+    models = [through_polariser(name, angle_deg) for name in fit.models or ()]
+    fit = fit.model_copy(update={"models": models or None})
+    return protocol.model_copy(update={"simulated_sample": sample, "fit": fit})
 
 
 def _checked_rig(file: _File, copy: Path | None) -> Rig | None:

@@ -358,6 +358,7 @@ class Protocol(Section):
 
     `goal`: u wanted of parameters, by name; the scan then chooses among the geometries of the
     sweeps, and those between them, until it is reached, or `budget_min` minutes are spent.
+    `polariser_deg`: axis of a polariser before the camera, from the plane of incidence.
     """
 
     name: Name
@@ -367,6 +368,7 @@ class Protocol(Section):
     sweeps: Annotated[list[SweepConfig], Field(min_length=1)]
     window: PatchConfig
     markers: Markers | None = None
+    polariser_deg: Annotated[float, Field(ge=0, le=90)] | None = None
     frames_per_point: Annotated[int, Field(ge=1, le=10_000)] = 4
     dark_frames: Annotated[int, Field(ge=1, le=10_000)] = 8
     exposure_target: Annotated[float, Field(gt=0, lt=1)] = 0.7

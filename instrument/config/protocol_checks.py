@@ -33,6 +33,7 @@ ModelCheck = Callable[[str, dict[str, float] | None], str | None]
 Mistakes = Iterator[tuple[KeyPath, str]]
 
 _MODELS: KeyPath = ("fit", "models")
+_LOBE = "fresnel_lobe"  # the model that a polariser's angle changes
 _GEOMETRY_DEG = {"theta_i": (0.0, 89.5), "theta_r": (-89.5, 89.5)}
 _DEGREES: TypeAdapter[Any] = TypeAdapter(Degrees)
 _ANGLES: TypeAdapter[Any] = TypeAdapter(Angles)
@@ -40,6 +41,7 @@ _AXIS: TypeAdapter[Any] = TypeAdapter(Axis)
 _POSITIVE: TypeAdapter[Any] = TypeAdapter(Positive)
 _PATCH: TypeAdapter[Any] = TypeAdapter(DarkPatch)
 _MARKERS: TypeAdapter[Any] = TypeAdapter(Markers)
+_NUMBER: TypeAdapter[Any] = TypeAdapter(Finite)
 _NAME: TypeAdapter[Any] = TypeAdapter(Name)
 _PARAMETERS: TypeAdapter[Any] = TypeAdapter(dict[str, Finite])
 
@@ -96,6 +98,9 @@ def own_mistakes(protocol: MarkedYaml, check_model: ModelCheck | None) -> Mistak
     yield from _window_past_surfaces(protocol)
     yield from _markers_covered(protocol)
     yield from _repeated(protocol)
+    if _valid(_NUMBER, protocol, "polariser_deg") is not None:
+        yield from _out_of_plane(protocol)
+        yield from _without_lobe(protocol)
     if check_model is not None:
         yield from _model_mistakes(protocol, check_model)
 
@@ -253,6 +258,48 @@ def _shared(sweeps: dict[int, list[list[float] | Steps]]) -> Mistakes:
                 f"{len(geometries)} of its geometries are already in sweeps[{earlier}], such as "
                 f"{example} deg; allowed: each once",
             )
+
+
+def through_polariser(model: str, angle_deg: float) -> str:
+    """Return the name of a model whose lobe a polariser at `angle_deg` shows.
+
+    The angle is that from the plane of incidence. Models without such a lobe keep their name.
+    """
+    terms = model.split("+")
+    return "+".join(f"{_LOBE}@{angle_deg:.10g}" if term == _LOBE else term for term in terms)
+
+
+def _out_of_plane(protocol: MarkedYaml) -> Mistakes:
+    """Yield azimuths at which a polariser's angle from the plane of incidence means nothing."""
+    for sweep in range(_items(protocol.get(("sweeps",)))):
+        path: KeyPath = ("sweeps", sweep, "dphi_deg")
+        angles = _valid(_ANGLES, protocol, *path)
+        if angles is None or _count(angles) > MAX_GEOMETRIES:
+            continue
+        for value in angles_deg(angles)[angles_deg(angles) % 180 != 0][:1]:
+            yield (
+                path,
+                f"{value:g} deg beside polariser_deg; allowed: 0 and 180 deg, where lamp, camera "
+                "and normal lie in one plane",
+            )
+
+
+def _without_lobe(protocol: MarkedYaml) -> Mistakes:
+    """Yield models that say nothing of a polariser, or another angle of it."""
+    models = protocol.get(_MODELS)
+    names = [name for name in models if isinstance(name, str)] if isinstance(models, list) else []
+    sample: KeyPath = ("simulated_sample", "model")
+    simulated = _valid(_NAME, protocol, *sample)
+    for path, own in ((_MODELS, names), (sample, [simulated] if simulated else None)):
+        if own is not None and not any(_LOBE in name.split("+") for name in own):
+            yield (
+                path,
+                f"without the model {_LOBE} beside polariser_deg; allowed: a sum with it, such as "
+                f"oren_nayar+{_LOBE}, or no polariser_deg",
+            )
+    for name in names:
+        if f"{_LOBE}@" in name:
+            yield _MODELS, f"{name} beside polariser_deg; allowed: {_LOBE}, which takes its angle"
 
 
 def _model_mistakes(protocol: MarkedYaml, check_model: ModelCheck) -> Mistakes:

@@ -19,7 +19,14 @@ from instrument.geometry import Brdf, FloatArray, Geometry
 from sim.defects.mechanics import SeenAngles
 
 INDEX = 1.5  # of glass, paint and plastics
-FACETS = ("torrance_sparrow", "torrance_sparrow_lobe", "beckmann_spizzichino", "ggx", "ggx_f90")
+FACETS = (
+    "torrance_sparrow",
+    "torrance_sparrow_lobe",
+    "fresnel_lobe",
+    "beckmann_spizzichino",
+    "ggx",
+    "ggx_f90",
+)
 """Terms of a model that facets of its surface reflect; all others count as its body."""
 
 

@@ -71,6 +71,18 @@ def polarised(theta: ArrayLike, index: ArrayLike, h: ArrayLike) -> FloatArray:
     return h * para + (1 - h) * perp
 
 
+def polarised_by_index(theta: FloatArray, n: float, h: float) -> FloatArray:
+    """Derivative of `polarised` by a real index n > 1, dimensionless, of theta's shape in radians.
+
+    From the derivatives of the amplitudes that `transmittance_with_gradients` states.
+    """
+    c, (para, perp) = np.cos(theta), amplitudes(theta, n)
+    q = np.sqrt((n - 1) * (n + 1) + c * c)
+    by_para = 2 * n * c * (2 * q * q - n * n) / (q * np.square(n * n * c + q))
+    by_perp = -2 * n * c / (q * np.square(c + q))
+    return np.asarray(2 * h * para.real * by_para + 2 * (1 - h) * perp.real * by_perp)
+
+
 def unpolarised(theta: ArrayLike, index: ArrayLike) -> FloatArray:
     """F(theta, n) of natural light: 1998, equation (2), which is (42) with h = v = 1/2.
 

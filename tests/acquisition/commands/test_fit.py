@@ -252,6 +252,37 @@ def test_options_go_before_the_fit_block_of_a_run(tmp_path: Path) -> None:
     assert "--u-shared: 0.01 for a run, which states its own shared errors" in refused.stderr
 
 
+def test_a_run_with_a_polariser_finds_the_index_of_its_sample(tmp_path: Path) -> None:
+    """Taken for natural light, the same table gives another index."""
+    angle_deg = 90
+    truth = {"index": 1.45, "lobe_sigma_deg": 15.0}
+    protocol, name = small_demo(tmp_path, "lambert+fresnel_lobe"), f"fresnel_lobe@{angle_deg}"
+    text = protocol.read_text().replace("oren_nayar+torrance_sparrow", "lambert+fresnel_lobe")
+    text = text.replace("sigma_deg: 20.0, ks: 0.076", "index: 1.45, lobe_sigma_deg: 15.0")
+    protocol.write_text(f"{text}polariser_deg: {angle_deg}\n")
+    done = gonio("run", protocol, "--out", tmp_path / "run", "--json")
+    assert json.loads(done.stdout)["chosen"] == f"lambert+{name}", done.stderr
+    done = gonio("fit", tmp_path / "run", "--models", "lambert+fresnel_lobe", "--json")
+    (found,) = json.loads(done.stdout)["candidates"]
+    assert found["model"] == f"lambert+{name}"
+    for key, true in truth.items():
+        parameter = found["parameters"][key]
+        assert abs(parameter["value"] - true) < 4 * parameter["u"], key
+    table_alone = tmp_path / "run" / "measurements.csv"
+    done = gonio("fit", table_alone, "--models", "lambert+fresnel_lobe", "--json")
+    natural = json.loads(done.stdout)["candidates"][0]["parameters"]["index"]
+    assert abs(natural["value"] - truth["index"]) > 2 * natural["u"]
+
+
+def test_a_polariser_s_angle_is_refused_out_of_plane(tmp_path: Path) -> None:
+    path = tmp_path / "across.csv"
+    path.write_text(HEADER + "".join(f"40,{r},90,0.2,0.001\n" for r in range(5, 60, 5)))
+    done = gonio("fit", path, "--models", "lambert+fresnel_lobe@30")
+    assert done.returncode == 2
+    assert "lambert+fresnel_lobe@30: 11 of 11 points lie out of plane" in done.stderr
+    assert done.stdout == ""
+
+
 def notes(done: subprocess.CompletedProcess[str]) -> dict[str, str]:
     return {note["code"]: note["text"] for note in json.loads(done.stdout)["notes"]}
 

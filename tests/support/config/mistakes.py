@@ -118,8 +118,8 @@ PROTOCOL_MISTAKES = {
         "point: 4",
         "point: 4\ncolour: red",
         "10:1: colour: unknown key; allowed: name, description, rig, sample, sweeps, window,"
-        " markers, frames_per_point, dark_frames, exposure_target, keep_frames, maps, motion, fly,"
-        " references, fit, simulated_sample, metadata, goal, budget_min",
+        " markers, polariser_deg, frames_per_point, dark_frames, exposure_target, keep_frames,"
+        " maps, motion, fly, references, fit, simulated_sample, metadata, goal, budget_min",
     ),
     "misspelt key that is required": (
         "u_reflectance: 0.005",
