@@ -95,6 +95,7 @@ class NextPoints:
         self._chosen = multiples > 0
         self._dwell = _best_multiples(self._noise / (1 + self._by_view()), costs)
         self._posterior = Posterior(self._by_frames(self._dwell), self._weights, self._chosen)
+        self._doubted = known.verdict == "none adequate"
         self._rivals = list(_rivals(known, every))
         self.asked = [n for n in self._information.names if n in aims.u]
 
@@ -134,7 +135,10 @@ class NextPoints:
         And the logarithm by which they lower what is missed, per second. spread: points for lack of
         fit so far. ratio: factor on the forecast u of each; what is beyond the goal hardly counts.
         """
-        batch, rate = self._best(size, allowed & ~self._chosen, self._target(ratio))
+        target = self._target(ratio)
+        if self._doubted and np.all(self._posterior.variance <= target):
+            return self._looking(size, allowed), 0.0
+        batch, rate = self._best(size, allowed & ~self._chosen, target)
         reasons = self._reasons(batch)
         apart = self._telling(allowed & ~self._chosen & ~batch, batch)
         if apart is not None:
@@ -142,6 +146,21 @@ class NextPoints:
         self._spread(reasons, spread, allowed)
         times = np.where(batch, self._dwell, 1)
         return [Pick(k, why, int(times[k])) for k, why in reasons.items()], rate
+
+    def _looking(self, size: int, allowed: BoolArray) -> list[Pick]:
+        """Return points for lack of fit alone, the farthest from all before them.
+
+        No model holds, and what u the leading one would have is small enough: more points for it
+        say nothing more.
+        """
+        taken, found = self._chosen.copy(), list[Pick]()
+        for _ in range(size):
+            far = farthest_from(self.every.measurements.geometry, taken, allowed)
+            if far is None:
+                break
+            taken[far] = True
+            found.append(Pick(far, LACK_OF_FIT))
+        return found
 
     def _best(self, size: int, free: BoolArray, target: FloatArray) -> tuple[BoolArray, float]:
         """Return the best further points, a mask (N,), and the rate of `_batch`.

@@ -80,7 +80,7 @@ def test_killed_at_random_moments_a_scan_goes_on_with_the_same_choices_and_readi
     tmp_path: Path, slow: bool, record_testsuite_property: Callable[[str, object], None]
 ) -> None:
     """With SIGKILL, while it measures and while it chooses."""
-    kills, killer = 300 if slow else 5, "tests.support.adaptive.adaptive_killer"
+    kills, killer = 300 if slow else 4, "tests.support.adaptive.adaptive_killer"
     outcome = json.loads(run_scan_killer([tmp_path, kills, 21], {}, 1800, killer))
     record_testsuite_property("kills of adaptive scans", outcome)
     assert outcome["kills"] >= kills
