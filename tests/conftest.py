@@ -52,8 +52,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Two more workers than cores: many tests wait for a process or a device now and then."""
-    return len(os.sched_getaffinity(0)) + 2
+    """One more worker than cores: many tests wait for a process or a device now and then."""
+    return len(os.sched_getaffinity(0)) + 1
 
 
 @pytest.hookimpl(wrapper=True)
