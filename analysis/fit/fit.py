@@ -34,7 +34,7 @@ from analysis.fit.scale_ratios import Ratio, scale_ratios
 from analysis.fit.search.levenberg_marquardt import Minimum
 from analysis.fit.search.minima import all_minima, deepest
 from analysis.fit.search.problem import Problem
-from analysis.fit.uncertainty import uncertainty, unknown
+from analysis.fit.uncertainty import Uncertainty, uncertainty, unknown
 from analysis.models import Model
 from analysis.models.base import Validity
 from instrument.geometry import BoolArray, FloatArray, Geometry
@@ -283,14 +283,11 @@ def _result(
     problem, found = replace(fitted.problem, covariance=covariance), fitted.solution
     x = found.x
     noise = noise_variance(m, fitted.problem, found)
-    unscaled = unscaled_parameters(problem.model) if m.relative else frozenset[str]()
     found = found._replace(chi2=problem.chi2(x))
     near = m.u_random is None or reduced_chi2(problem, found) < _FAR_CHI2
-    profiles = intervals == "profiles" and near
     known, ratios = unknown(problem), dict[str, Ratio]()
     if intervals != "none":
-        known = uncertainty(fitted.problem, fitted.solution, noise, unscaled, profiles)
-        ratios = scale_ratios(fitted.problem, fitted.solution, noise, profiles=profiles)
+        known, ratios = _known(m, fitted, noise, profiles=intervals == "profiles" and near)
     predicted = problem.predict(x)
     residual = m.brdf - predicted
     scale = math.sqrt(noise) if m.u_random is None and problem.huber is None else 1.0
@@ -332,6 +329,16 @@ def _result(
         converged=found.converged and fitted.converged,
         message=found.message if fitted.converged else NOT_CONVERGED,
     )
+
+
+def _known(
+    m: Measurements, fitted: AveragedFit, noise: float, *, profiles: bool
+) -> tuple[Uncertainty, dict[str, Ratio]]:
+    """Uncertainties of the parameters and of the ratios of scales."""
+    problem, found = fitted.problem, fitted.solution
+    unscaled = unscaled_parameters(problem.model) if m.relative else frozenset[str]()
+    ratios = scale_ratios(problem, found, noise, profiles=profiles)
+    return uncertainty(problem, found, noise, unscaled, profiles), ratios
 
 
 def _outliers(residuals: FloatArray) -> BoolArray:
