@@ -36,11 +36,21 @@ class ModelThread(Closeable):
             self._wanted.notify_all()
 
     def finish(self, limit_s: float) -> None:
-        """Fit what still waits at once, and wait for it as long as this: the scan is over."""
+        """Fit what still waits at once, and wait for it: the scan is over.
+
+        limit_s: of processor time of this process, as a busy machine leaves it a small share; of
+        real time 30 times as long.
+        """
+        end_s, used_s = time.monotonic() + 30 * limit_s, time.process_time() + limit_s
         with self._wanted:
             self._hurry = True
             self._wanted.notify_all()
-            self._wanted.wait_for(lambda: self._newest is None and not self._busy, limit_s)
+            while (left_s := used_s - time.process_time()) > 0 and time.monotonic() < end_s:
+                if self._wanted.wait_for(self._idle, left_s):
+                    break
+
+    def _idle(self) -> bool:
+        return self._newest is None and not self._busy
 
     def close(self) -> None:
         """End the thread, after the fit that is under way; does not wait for it."""
