@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from acquisition.results.effects.quick_fit import QuickFit, quick_fit
 from instrument.config.protocol import Protocol
 from instrument.config.rig import Rig
 from instrument.geometry import FloatArray
 from instrument.record.reading import Reading
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Readings:
     """Readings of the N points of a run, and for each the white tile's reading; None without it.
 
@@ -33,6 +35,11 @@ class Readings:
         names = ("theta_i_deg", "theta_r_deg", "dphi_deg")
         theta_i, theta_r, dphi = (np.array([getattr(p, n) for p in self.points]) for n in names)
         return theta_i, theta_r, dphi
+
+    @cached_property
+    def fit(self) -> QuickFit | None:
+        """Quick fit to the values; None if there are too few points to tell."""
+        return quick_fit(self.angles_deg(), self.value, absolute=self.absolute)
 
     def of_points(self, name: str) -> FloatArray:
         """Numbers of the points' readings, (N,), in the unit of their name."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from acquisition.results.effects.effect import Effect, Readings
-from instrument.geometry import FloatArray
+from instrument.geometry import FloatArray, Geometry
 
 VIGNETTING, STRAY, WALLS = "vignetting", "stray light", "light from the surroundings"
 
@@ -112,10 +112,17 @@ def _share_within(
 
 
 def _walls(readings: Readings) -> FloatArray:
-    """Change, (N,), by light from all directions: of a matt surface that is the same as of a tile.
+    """Change, (N,), by light from all directions, beyond that of a matt tile.
 
-    All light together is reflected as the median of the values says.
+    How much of it the surface reflects to the camera is known from a quick fit. With too few points
+    for one it is as much as the median of the values says.
     """
-    theta_i = readings.angles_deg()[0]
-    usual = float(np.nanmedian(readings.value))
-    return (usual / np.maximum(readings.value, 1e-3 * usual) - 1) / np.cos(np.radians(theta_i))
+    theta_i, theta_r, dphi = readings.angles_deg()
+    fit, value = readings.fit, readings.value
+    usual: FloatArray | float = float(np.nanmedian(value))
+    if fit is not None:
+        usual = fit.hemisphere_mean(theta_r)
+        if not readings.absolute:  # each setting of the lamp has a unit of its own
+            geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
+            value = fit.values(geometry)
+    return (usual / np.maximum(value, 1e-3 * usual) - 1) / np.cos(np.radians(theta_i))

@@ -3,33 +3,21 @@
 Light that comes out of the sample's inside has passed its surface twice, and light of the mirror
 side is reflected by facets; both prefer one polarisation, by Fresnel's formulas for an index of
 1.5, which is near that of most dielectrics. The tile is a perfect depolariser. Which part of a
-value the facets reflect is estimated from the values themselves, by quick fits of a rough matt
-surface with a lobe. Values without a tile have an unknown unit at each setting of the lamp, and are
-fitted as such.
+value the facets reflect is estimated from the values themselves, by a quick fit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
 from acquisition.results.effects.effect import Effect, Readings
-from analysis.data.measurements import Measurements
-from analysis.fit.first_fit import FirstFits
-from analysis.fit.fit import refine
-from analysis.fit.relative_scale import FACTOR_NAME
-from analysis.fit.search.problem import Problem
-from analysis.models import MODELS
 from analysis.models.smooth.fresnel import reflectances
-from instrument.errors import NotDetermined
-from instrument.geometry import FloatArray, camera_direction, lamp_direction
+from instrument.geometry import FloatArray, Geometry, camera_direction, lamp_direction
 
 LAMP, CAMERA = "polarisation of the lamp", "polarisation of the camera"
 _INDEX = 1.5
-_BODY, _LOBES = "oren_nayar", ("torrance_sparrow_lobe", "ggx")
-_U_FIT = 0.01  # relative, of the values in the quick fit
 
 
 def polarisation_effects(readings: Readings) -> Iterator[Effect]:
@@ -55,41 +43,17 @@ def polarisation_effects(readings: Readings) -> Iterator[Effect]:
 
 
 def _share_of_facets(readings: Readings) -> FloatArray:
-    """Share of the values, (N,), that the facets of the surface reflect, by quick fits.
+    """Share of the values, (N,), that the facets of the surface reflect, by a quick fit.
 
-    It lies between 0 and 1, and is 0 where there are too few points to tell.
+    It is 0 where the fit has no value, and everywhere if there are too few points to tell.
     """
+    fit = readings.fit
+    if fit is None:
+        return np.zeros(readings.value.size)
     theta_i, theta_r, dphi = readings.angles_deg()
     known = np.isfinite(readings.value) & (readings.value > 0)
-    value, share = readings.value[known], np.zeros(known.size)
-    m = Measurements.bare(theta_i[known], theta_r[known], dphi[known], value, _U_FIT * value)
-    if not readings.absolute:
-        m = replace(m, relative=True, free_levels=True)
-    try:
-        problem, x = _quick_fit(m)
-    except NotDetermined:
-        return share
-    fitted = dict(zip((p.name for p in problem.model.parameters), x.tolist(), strict=True))
-    lobe = MODELS[problem.model.name.removeprefix(f"{_BODY}+")]
-    facets = lobe.brdf(m.geometry, **{p.name: fitted[p.name] for p in lobe.parameters})
-    facets *= fitted.get(FACTOR_NAME, 1.0)
-    whole = problem.model_brdf(x, m.geometry)
-    share[known] = np.clip(facets / np.maximum(whole, 1e-12), 0.0, 1.0)
-    return share
-
-
-def _quick_fit(m: Measurements) -> tuple[Problem, FloatArray]:
-    """Return the better fit of a rough matt surface with one of the lobes: its problem, and x (K,).
-
-    Unknown levels of the lamp need the shared errors of a full fit: a lobe would explain them.
-    """
-    fits = FirstFits(m)
-    firsts = [fits.of(MODELS[f"{_BODY}+{lobe}"]) for lobe in _LOBES]
-    if m.free_levels:
-        full = min((refine(f, m, None, profiles=False) for f in firsts), key=lambda one: one.bic)
-        return full.problem, full.x
-    best = min(firsts, key=lambda one: one.bic)
-    return best.problem, best.solution.x
+    geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
+    return np.where(known, fit.share_of_facets(geometry), 0.0)
 
 
 def _transmitted_excess(theta_deg: FloatArray) -> FloatArray:

@@ -122,7 +122,10 @@ CASES: dict[str, tuple[Any, SimulatedSample, dict[str, Any], dict[str, float], f
     "vignetting": (
         lens_effects, MATT, {"lens_defects": {"vignetting": 0.05}}, {"u_vignetting": 0.05}, 0.1
     ),
-    "walls": (lens_effects, MATT, {"wall_light": 0.005}, {"u_wall_light": 0.005}, 0.5),
+    "walls": (lens_effects, MATT, {"wall_light": 0.005}, {"u_wall_light": 0.005}, 0.1),
+    "walls about a glossy sample": (
+        lens_effects, GLOSSY, {"wall_light": 0.005}, {"u_wall_light": 0.005}, 0.1
+    ),
     "polarised lamp": (
         polarisation_effects,
         MATT,
