@@ -41,10 +41,13 @@ def is_refused(address: str) -> bool:
         return line.connect_ex((parts.hostname or "", parts.port or 0)) != 0
 
 
-def test_a_browser_gets_the_last_point_and_its_model_before_the_page_ends(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(page_process, "_END_S", 60.0)  # beside other processes it has a small share
+@pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A minute for a page to end: beside other processes it has a small share of the machine."""
+    monkeypatch.setattr(page_process, "_END_S", LONG_S)
+
+
+def test_a_browser_gets_the_last_point_and_its_model_before_the_page_ends(tmp_path: Path) -> None:
     loaded, run = live_protocol(tmp_path), tmp_path / "run"
     with begun_run(loaded, run) as record, ExitStack() as stack:
         with live_page(run) as address:
