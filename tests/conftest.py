@@ -18,7 +18,10 @@ from hypothesis import HealthCheck, settings
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from instrument.config.load import Loaded, load_protocol
+from sim.scene.render import electrons_per_s
 from tests.support.paths import CONFIGS
+from tests.support.remembered_light import RememberedLight
+from tests.support.storage.memory_folder import RAM, has_room
 from tests.support.timing import standstill
 
 if TYPE_CHECKING:
@@ -42,6 +45,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
     With those, programs under test would ignore stops.
     """
+    if has_room(RAM):
+        os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(RAM))
     settings.load_profile("whole" if config.getoption("--slow") else "bounded")
     defaults = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL,
                 signal.SIGQUIT: signal.SIG_DFL}  # fmt: skip
@@ -102,6 +107,13 @@ def _charts_where_asked_for(request: pytest.FixtureRequest) -> Iterator[None]:
         if not request.node.get_closest_marker("charts"):
             patch.setattr("analysis.report.figure_list.embedded_svg", lambda *_: "<svg></svg>")
             patch.setattr("analysis.report.page.rendered_html", lambda *_: "")
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _scenes_rendered_once() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sim.scene.sensor.electrons_per_s", RememberedLight(electrons_per_s))
         yield
 
 

@@ -29,10 +29,10 @@ from sim.clock import SimulatedClock
 from sim.scene.camera import SimulatedCamera
 from sim.scene.scene import Scene
 from tests.support.scans import changed, small_scan
+from tests.support.storage.memory_folder import RAM
 from tests.support.timing.cpu_time import cpu_seconds
 
 MOST_MB = 20.0  # promised limit of memory growth
-RAM = Path("/dev/shm")  # measures the scan's time, not the disk's
 REFERENCE_EVERY = 5  # steps
 
 

@@ -39,8 +39,8 @@ from instrument.errors import DeviceError, InputError, OperatorStop
 from instrument.record.reading import Reading
 from instrument.record.record import FILE_NAME, Record
 from tests.support.scans import changed, small_scan, undated
+from tests.support.storage.memory_folder import RAM
 
-RAM = Path("/dev/shm")  # memory, where available: thousands of commits would wear a disk
 BEYOND_END = 400  # more device calls than any of these scans makes
 
 

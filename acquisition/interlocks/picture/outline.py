@@ -26,6 +26,7 @@ LENS_DISTORTION = 5e-4
 """Standard uncertainty of an edge as a share of the picture's width: a good lens distorts 0.1 %."""
 _LEAST_U_PX = 0.2  # of an edge, in a small picture: half of its blur
 _FREE = 100.0  # standard uncertainty in deg or mm of a parameter to be found
+_CONVERGED = 1e-9  # change in deg or mm of a parameter that fits
 _LEAST_EDGES = 2  # one edge alone may be that of something else
 
 
@@ -237,6 +238,8 @@ class Comparison:
             away = prior @ (values - known.mean)
             step = np.linalg.solve(normal, gradient.T @ (weights * residual) - away)
             values = values + np.clip(step, -10, 10)
+            if np.abs(step).max() < _CONVERGED:
+                break
         at, away = Deviation.of(values), values - known.mean
         residual = self.found_px - self.outline.offsets_px(self.edges, at)
         chi2 = float(residual @ (weights * residual) + away @ prior @ away)
