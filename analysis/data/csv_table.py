@@ -16,6 +16,7 @@ of a run does: fitted, it gives what the run's folder gives.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,12 +24,11 @@ import numpy as np
 
 from analysis.data import csv_columns as columns
 from analysis.data.acceptance import Acceptance
-from analysis.data.csv_columns import ANGLES, BRDF, COLUMNS, U_BRDF
+from analysis.data.csv_cells import Cells
+from analysis.data.csv_columns import ANGLES, BRDF, U_BRDF
 from analysis.data.csv_header import ROWS, Header, read_header
-from analysis.data.csv_optional import OptionalColumns
 from analysis.data.measurements import Measurements, setting_numbers
 from instrument.geometry import FloatArray
-from instrument.text.csv_column import Column
 from instrument.text.csv_line import QuoteError, column_of, texts_of
 from instrument.text.text_file import TextFile, input_error, read_text
 
@@ -70,11 +70,7 @@ def table_of(file: TextFile, *, repeats: bool = False) -> CsvTable:
     """
     rows = file.rows()
     table = _Table(file, read_header(file, rows), repeats)
-    for line, text in rows:
-        table.add(line, text)
-    table.finish()
-    if file.mistakes:
-        raise input_error(file)
+    table.add(rows)
     return table.content()
 
 
@@ -82,49 +78,67 @@ def table_of(file: TextFile, *, repeats: bool = False) -> CsvTable:
 class _Table:
     """The rows below a header; `repeats` allows several of one geometry.
 
-    rows: a value for each of COLUMNS, NaN where none could be read. fields: line and texts of each
-        of these rows.
-    flagged: number of rows with a flag, which are not read any further.
-    first_lines: line of the first row with each geometry.
-    blank: lines in which a column is empty that may be empty in every row.
+    lines, texts: of each row to fit. flagged: number of rows with a flag, which are not read any
+    further.
     """
 
     file: TextFile
     header: Header
     repeats: bool
-    rows: list[list[float]] = field(default_factory=list)
-    fields: list[tuple[int, list[str]]] = field(default_factory=list)
+    lines: list[int] = field(default_factory=list)
+    texts: list[str] = field(default_factory=list)
     flagged: int = 0
-    first_lines: dict[tuple[float, ...], int] = field(default_factory=dict)
-    blank: dict[str, list[int]] = field(default_factory=lambda: {"brdf": [], "u_brdf": []})
 
-    def add(self, line: int, text: str) -> None:
-        """Read a row, or note its mistakes."""
+    def add(self, rows: Iterable[tuple[int, str]]) -> None:
+        """Take the rows, line and text of each, or note their mistakes."""
+        flags, commas = self.header.indices.get(columns.FLAGS), self.header.width - 1
+        for line, text in rows:
+            plain = bool(self.texts) and '"' not in text and text.count(",") == commas
+            if plain and flags is not None:
+                plain = not text.split(",", flags + 1)[flags].strip()
+            if plain or self._is_to_fit(line, text, flags):
+                self.lines.append(line)
+                self.texts.append(text)
+
+    def _is_to_fit(self, line: int, text: str, flags: int | None) -> bool:
+        """Look at one row closely; note its mistakes."""
+        fields = self._fields(line, text)
+        if fields is None:
+            return False
+        if flags is not None and fields[flags].strip():
+            self.flagged += 1
+            return False
+        if not self.texts and self._holds_no_number(fields):
+            what = "row: no number in it; begin a line of units or of names with #"
+            self.file.note(line, 1, what)
+            return False
+        return True
+
+    def _fields(self, line: int, text: str) -> list[str] | None:
+        """Texts of a row; None, and a mistake noted, if they are not those of the header."""
         try:
             fields = texts_of(text)
         except QuoteError as error:
             self.file.note(line, error.column, f"row: {error}")
-            return
+            return None
         if len(fields) != self.header.width:
             self._note_width(line, text, len(fields))
+            return None
+        return fields
+
+    def _note_repeats(self, cells: Cells, *angles_deg: FloatArray) -> None:
+        """Note each row with the same three angles, (N,) each, as an earlier one."""
+        order = np.lexsort(angles_deg)
+        if not np.any(np.all([np.diff(own[order]) == 0 for own in angles_deg], axis=0)):
             return
-        flags = self.header.indices.get(columns.FLAGS)
-        if flags is not None and fields[flags].strip():
-            self.flagged += 1
-            return
-        if not self.fields and self._holds_no_number(fields):
-            what = "row: no number in it; begin a line of units or of names with #"
-            self.file.note(line, 1, what)
-            return
-        row = [self._value(line, column, fields) for column in COLUMNS]
-        self.rows.append(row)
-        self.fields.append((line, fields))
-        angles = (row[0], row[1], row[2])
-        first = self.first_lines.setdefault(angles, line)
-        if first != line and not self.repeats and not math.isnan(sum(angles)):
-            what = f"the same three angles as in line {first}"
-            allowed = "each geometry once; average repeats with their u: --repeats mean"
-            self._note(line, "theta_i_deg", f"{what}; allowed: {allowed}")
+        first_lines: dict[tuple[float, ...], int] = {}
+        places = zip(*(own.tolist() for own in angles_deg), strict=True)
+        for n, (line, place) in enumerate(zip(self.lines, places, strict=True)):
+            first = first_lines.setdefault(place, line)
+            if first != line and not math.isnan(sum(place)):
+                what = f"the same three angles as in line {first}"
+                allowed = "each geometry once; average repeats with their u: --repeats mean"
+                cells.note(n, "theta_i_deg", f"{what}; allowed: {allowed}")
 
     def _holds_no_number(self, fields: list[str]) -> bool:
         """True if each angle is a text without a digit, as in a second line of the header."""
@@ -141,60 +155,25 @@ class _Table:
             hint = " (decimal numbers take a point; text with a comma needs quotes)"
             self.file.note(line, column_of(text, self.header.width), what + hint)
 
-    def _value(self, line: int, column: Column, fields: list[str]) -> float:
-        if column.name not in self.header.indices:
-            return math.nan
-        text = fields[self.header.indices[column.name]]
-        if column.name in self.blank and not text.strip():
-            self.blank[column.name].append(line)
-            return math.nan
-        try:
-            return column.parse(text)
-        except ValueError as error:
-            self._note(line, column.name, str(error))
-            return math.nan
-
-    def _note(self, line: int, name: str, what: str) -> None:
-        start = column_of(self.file.lines[line - 1], self.header.indices[name])
-        self.file.note(line, start, f"{name}: {what}")
-
-    def finish(self) -> None:
-        """Note mistakes of the table as a whole."""
-        if not self.rows:
-            if not self.file.mistakes and not self.flagged:
-                what = f"header: no row follows; allowed: {ROWS}"
-                self.file.note(self.header.line, 1, what)
-        elif self._no_brdf and columns.RADIANCE.name not in self.header.indices:
-            what = "is empty in every row: no reference was taken, so there is no BRDF to fit"
-            allowed = "a scan with a white tile, or a column radiance"
-            self._note(self.header.line, "brdf", f"{what}; allowed: {allowed}")
-        else:
-            self._note_blank()
-
-    @property
-    def _no_brdf(self) -> bool:
-        return 0 < len(self.rows) == len(self.blank["brdf"])
-
-    def _note_blank(self) -> None:
-        for column in (BRDF, U_BRDF):
-            lines = self.blank[column.name]
-            for line in lines if len(lines) < len(self.rows) else ():
-                what = f"is empty here, but not in every row; allowed: {column.allowed}"
-                self._note(line, column.name, what)
-
     def content(self) -> CsvTable:
-        """All rows in the order of the file; further mistakes are noted, and raised.
-
-        Raises `InputError`.
-        """
-        theta_i, theta_r, dphi, brdf, u = np.array(self.rows).reshape(-1, len(COLUMNS)).T
-        optional = OptionalColumns(self.file, self.header, self.fields)
-        brdf = self._relative(optional, theta_i) if self._no_brdf else brdf
-        own = self._u_independent(optional, brdf)
-        u_random = None if own is None and np.isnan(u).any() else u if own is None else own
-        setting = optional.whole_numbers(columns.LAMP_SETTING)
-        shared, acceptance = optional.shared(), optional.acceptance()
-        u_theta_i, u_theta_r, u_dphi = self._u_angles(optional, u_random)
+        """All rows in the order of the file. Raises `InputError` with every mistake."""
+        if not self.texts and not self.file.mistakes and not self.flagged:
+            what = f"header: no row follows; allowed: {ROWS}"
+            self.file.note(self.header.line, 1, what)
+            raise input_error(self.file)
+        cells = Cells(self.file, self.header, self.lines, self.texts)
+        cells.read()
+        theta_i, theta_r, dphi = (cells.needed(column) for column in ANGLES)
+        if not self.repeats:
+            self._note_repeats(cells, theta_i, theta_r, dphi)
+        values, u_brdf = cells.numbers(BRDF), cells.numbers(U_BRDF)
+        relative = values is None and bool(self.texts)
+        brdf = self._relative(cells, theta_i) if values is None else values
+        own = self._u_independent(cells, brdf)
+        u_random = u_brdf if own is None else own
+        setting = cells.whole_numbers(columns.LAMP_SETTING)
+        shared, acceptance = cells.shared(), cells.acceptance()
+        u_theta_i, u_theta_r, u_dphi = self._u_angles(cells, u_random)
         if self.file.mistakes:
             raise input_error(self.file)
         found = Measurements(
@@ -208,39 +187,43 @@ class _Table:
             u_theta_i_deg=u_theta_i,
             u_theta_r_deg=u_theta_r,
             u_dphi_deg=u_dphi,
-            relative=self._no_brdf,
-            free_levels=self._no_brdf,
+            relative=relative,
+            free_levels=relative,
         )
         states_shared, ignored = bool(shared) or own is not None, self.header.ignored
         return CsvTable(found, acceptance, self.flagged, states_shared, ignored)
 
-    def _relative(self, optional: OptionalColumns, theta_i_deg: FloatArray) -> FloatArray:
+    def _relative(self, cells: Cells, theta_i_deg: FloatArray) -> FloatArray:
         """Radiance over cos(theta_i), (N,), proportional to the BRDF at one lamp setting."""
-        radiance = optional.numbers(columns.RADIANCE)
-        if radiance is None:
-            what = "is empty in every row, and so is radiance; allowed: one of them"
-            self._note(self.header.line, "brdf", what)
-            return np.zeros_like(theta_i_deg)
-        return np.asarray(radiance / np.cos(np.radians(theta_i_deg)))
+        radiance = cells.numbers(columns.RADIANCE)
+        if radiance is not None:
+            return np.asarray(radiance / np.cos(np.radians(theta_i_deg)))
+        what = "is empty in every row, and so is radiance; allowed: one of them"
+        if columns.RADIANCE.name not in self.header.indices:
+            what = "is empty in every row: no reference was taken, so there is no BRDF to fit"
+            what += "; allowed: a scan with a white tile, or a column radiance"
+        if self.texts:
+            cells.note_header("brdf", what)
+        return np.zeros_like(theta_i_deg)
 
-    def _u_independent(self, optional: OptionalColumns, values: FloatArray) -> FloatArray | None:
+    def _u_independent(self, cells: Cells, values: FloatArray) -> FloatArray | None:
         """Independent u (N,) in the unit of the values, where it is stated relative to them."""
         column = columns.U_INDEPENDENT
-        u_relative = optional.numbers(column)
+        u_relative = cells.numbers(column)
         if u_relative is None:
             return None
         u = u_relative * np.abs(values)
         for n in np.flatnonzero(u < U_BRDF.low):
             what = f"of {values[n]:g} is {u[n]:g}; allowed: {U_BRDF.low:g} or more; state u_brdf"
-            optional.note(int(n), column.name, what)
+            cells.note(int(n), column.name, what)
         return u
 
-    def _u_angles(self, optional: OptionalColumns, u_random: FloatArray | None) -> list[float]:
+    def _u_angles(self, cells: Cells, u_random: FloatArray | None) -> list[float]:
         """Standard uncertainties of theta_i, theta_r and dphi in degrees, 0 if not stated."""
         found = []
         for column in columns.U_ANGLES:
-            found.append(optional.constant(column) or 0.0)
+            found.append(cells.constant(column) or 0.0)
             if found[-1] > 0 and u_random is None:
                 what = f"is stated; allowed: with u_brdf or {columns.U_INDEPENDENT.name} only"
-                self._note(self.header.line, column.name, what)
+                cells.note_header(column.name, what)
         return found

@@ -154,5 +154,9 @@ class Measurements:
 
 def setting_numbers(theta_i_deg: FloatArray, dphi_deg: FloatArray) -> IntArray:
     """Number of each point's lamp setting (N,): equal for equal theta_i and dphi (N,), degrees."""
-    pairs = np.stack([theta_i_deg, dphi_deg], axis=-1)
-    return np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+    lamps, azimuths = (
+        np.unique(angle, return_inverse=True)[1].astype(np.int64)
+        for angle in (theta_i_deg, dphi_deg)
+    )
+    pairs = lamps * (azimuths.max(initial=0) + 1) + azimuths
+    return np.unique(pairs, return_inverse=True)[1].reshape(-1).astype(np.int64)

@@ -6,6 +6,9 @@ import math
 import re
 from dataclasses import dataclass
 
+import numpy as np
+
+from instrument.geometry import FloatArray
 from instrument.text.text_file import parse_number
 
 
@@ -33,6 +36,11 @@ class Column:
             found = f"{text.strip()[:40]} {self.unit}".strip()
             raise ValueError(f"{found}; allowed: {self.allowed}")
         return value
+
+    def allows(self, values: FloatArray) -> bool:
+        """True if all numbers (N,), in the column's unit, are allowed: none is NaN or infinite."""
+        inside = np.all((values >= self.low) & (values <= self.high) & np.isfinite(values))
+        return bool(inside and not (self.whole and np.any(values % 1)))
 
 
 # A number in an everyday form: 0,5; −5 with a typographic minus; 30° or 30 deg.

@@ -97,11 +97,11 @@ def read_text(path: Path, *, pipe: bool = False) -> TextFile:
 
 
 def _with_short_lines(file: TextFile) -> TextFile:
-    for line, text in enumerate(file.lines, start=1):
-        if len(text) > MAX_LINE:
-            file.note(line, 1, f"a line of {len(text)} characters; allowed: {MAX_LINE}")
-            raise input_error(file)
-    return file
+    if max(map(len, file.lines)) <= MAX_LINE:
+        return file
+    line, text = next((n, own) for n, own in enumerate(file.lines, 1) if len(own) > MAX_LINE)
+    file.note(line, 1, f"a line of {len(text)} characters; allowed: {MAX_LINE}")
+    raise input_error(file)
 
 
 def _bytes(path: Path, name: str, pipe: bool) -> bytes:

@@ -75,7 +75,8 @@ MISTAKES = {
     "text": ({"lamp_setting": [1, "x"]}, "3:12: lamp_setting: 'x' is text; allowed: a whole"),
     "fraction": ({"lamp_setting": [1, 1.5]}, "3:12: lamp_setting: 1.5; allowed: a whole number"),
     "empty in one row": (
-        {"u_brdf": 1, "u_theta_r_deg": [1, ""]}, "3:14: u_theta_r_deg: is empty; allowed: 0",
+        {"u_brdf": 1, "u_theta_r_deg": [1, ""]},
+        "3:14: u_theta_r_deg: is empty here, but not in every row; allowed: 0",
     ),
     "not constant": (
         {"u_brdf": 1, "u_dphi_deg": [1, 2]},
