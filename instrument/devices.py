@@ -13,6 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
+CHANNELS = ("r", "g", "b")
+"""Channels of a colour picture, in the order of its last axis."""
+GREEN = CHANNELS.index("g")
+TRUSTED_SHARE = 0.97
+"""Share of full scale above which a camera's response is not trusted."""
 REPLY_S = 0.15
 """Time allowed for a controller's answer in s, unless the rig file gives its own `reply_s`.
 
@@ -31,7 +36,9 @@ class Frame:
     """One image: `image[row, column]` in counts (DN), its exposure and time of read-out.
 
     `device_time_s`: the camera's own time stamp in seconds of the monotonic clock, None if none.
-    `sequence`: number of the frame by the camera's driver, None if it does not count.
+    `sequence`: number of the frame by the camera's driver, None if it does not count. `colour`: of
+    a colour camera, counts (rows, columns, 3) in the order of `CHANNELS`, of which `image` is then
+    `mono_picture`; None for any other.
     """
 
     image: Image
@@ -39,6 +46,18 @@ class Frame:
     time_s: float
     device_time_s: float | None = None
     sequence: int | None = None
+    colour: Image | None = None
+
+
+def mono_picture(colour: Image, max_dn: int) -> Image:
+    """Return the picture (rows, columns) that stands for a colour one (rows, columns, 3), in DN.
+
+    It is the green channel, whose noise is that of one pixel. Where any channel is above the counts
+    that are trusted, the pixel has full scale, so that whoever reads it finds it saturated.
+    """
+    mono: Image = colour[..., GREEN].copy()
+    mono[(colour >= TRUSTED_SHARE * max_dn).any(axis=-1)] = max_dn
+    return mono
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,9 @@ from acquisition.plan.plan import make_plan
 from acquisition.results.reduction import Reduced, reduced_run
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded, load_protocol, load_rig
-from instrument.config.protocol import Protocol, SimulatedSample, Steps
+from instrument.config.protocol import Protocol, Steps
 from instrument.config.rig import Rig
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.record.record import Record
 
 BINNING = 2

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.measure.window import Window
 from instrument.config.camera import CameraConfig
@@ -21,7 +22,7 @@ _NEIGHBOURS = 5  # rows and columns around a pixel; the glow of an amplifier is 
 _MOST_NAMED = 1000
 
 
-def find_hot_pixels(dark_dn: FloatArray, camera: CameraConfig) -> BoolArray:
+def find_hot_pixels(dark_dn: NDArray[np.floating], camera: CameraConfig) -> BoolArray:
     """Return True for each hot pixel, (rows, columns), of a mean dark of that shape in DN."""
     import cv2
 

@@ -19,10 +19,10 @@ from acquisition.measure.placement import Placement, placement_u_dn
 from acquisition.measure.rounding import dark_rounding_dn, rounding_u_dn
 from acquisition.measure.window import Window
 from instrument.config.camera import CameraConfig
-from instrument.devices import Frame
+from instrument.devices import TRUSTED_SHARE, Frame
 from instrument.geometry import BoolArray, FloatArray
 
-SATURATION_FRACTION = 0.97  # of full scale: above it the response is not trusted
+SATURATION_FRACTION = TRUSTED_SHARE
 # Shares of the window's weight, above which a reading is flagged; less is part of its uncertainty.
 SATURATED_SHARE, HOT_SHARE = 0.001, 0.01
 LEAVES_FRAME, FEW_PIXELS = "window leaves frame", "too few pixels"
@@ -33,7 +33,8 @@ class Dark:
     """Dark of one exposure: `mean` (rows, columns) in DN, `variance` in DN^2, over `frames`.
 
     `hot` (rows, columns): True for a hot pixel, which does not count; None for none. `light_dn`:
-    light in it, see `acquisition.interlocks.darks`.
+    light in it, see `acquisition.interlocks.darks`. `colour`: mean of a colour camera's channels,
+    (rows, columns, 3) in DN.
     """
 
     exposure_s: float
@@ -42,6 +43,7 @@ class Dark:
     frames: int
     hot: BoolArray | None = None
     light_dn: float = 0.0
+    colour: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +84,21 @@ def average_dark(frames: Sequence[Frame], camera: CameraConfig) -> Dark:
     images = [camera.linear_dn(frame.image) for frame in frames]
     mean, variance = _mean_and_variance(images, camera)
     hot = find_hot_pixels(mean, camera)
-    return Dark(frames[0].exposure_s, mean, variance, len(frames), hot if hot.any() else None)
+    return Dark(
+        frames[0].exposure_s, mean, variance, len(frames), hot if hot.any() else None,
+        colour=_mean_colour(frames),
+    )  # fmt: skip
+
+
+def _mean_colour(frames: Sequence[Frame]) -> NDArray[np.float32] | None:
+    """Return the mean of the channels (rows, columns, 3) in DN; None without colour."""
+    pictures = [frame.colour for frame in frames if frame.colour is not None]
+    if not pictures:
+        return None
+    total = np.zeros(pictures[0].shape, dtype=np.float32)
+    for picture in pictures:
+        total += picture
+    return total / np.float32(len(pictures))
 
 
 def bright_level(counts: NDArray[Any]) -> float:

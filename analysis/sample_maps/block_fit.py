@@ -16,7 +16,7 @@ from instrument.geometry import FloatArray
 
 _LARGEST_ANGLE = 0.1  # degrees, from the middle of a block to its side
 _MOST_CELLS = 32  # along a side: their sums stay in the processor's cache
-_WORKERS = 2
+WORKERS = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +56,29 @@ class CellData:
             variance += (np.outer(self.blur, self.bend[rows, columns]) * brdf) ** 2
         return brdf, variance
 
+    def noise(self, brdf: FloatArray) -> FloatArray:
+        """Return the part of the variance, in 1/sr^2, by photons and read-out, of (K, C) in 1/sr.
+
+        The rest is that of `in_common`.
+        """
+        floor, per_brdf = self.floor[:, np.newaxis], self.per_brdf[:, np.newaxis]
+        return np.asarray(floor + per_brdf * np.maximum(brdf, 0.0))
+
+    def in_common(self, brdf: FloatArray, rows: slice, columns: slice) -> FloatArray:
+        """Return shifts (3, K, C), in 1/sr, of a block's BRDF (K, C) by one u of what it shares.
+
+        With other channels of the same picture: by the angles, the place, and the pixels' blur. The
+        sign tells whether two channels rise together.
+        """
+        count = brdf.shape[1]
+        shifts = [np.broadcast_to(self.relative[:, np.newaxis], brdf.shape)]
+        for u, slope in ((self.place_mm, self.texture), (self.blur, self.bend)):
+            if u is None or slope is None:
+                shifts.append(np.zeros((1, count)))
+            else:
+                shifts.append(np.outer(u, slope[rows, columns]))
+        return np.stack([shift * brdf for shift in shifts])
+
     def shared_of(self, rows: slice, columns: slice) -> FloatArray | None:
         """Return the relative shifts (K, M) of the block's cells by all that cells share."""
         if self.shared is None or self.texture is None or self.shared_mm is None:
@@ -91,13 +114,14 @@ def fit_blocks(data: CellData, tables: TableField, distance_mm: float) -> dict[s
             own = values[rows, columns]
             own[...] = getattr(fits, name).reshape(own.shape)
 
-    with ThreadPoolExecutor(_WORKERS) as pool:
-        for _ in pool.map(fit, _blocks(data, distance_mm)):
+    with ThreadPoolExecutor(WORKERS) as pool:
+        for _ in pool.map(fit, blocks_of(data, distance_mm)):
             pass
     return found
 
 
-def _blocks(data: CellData, distance_mm: float) -> Iterator[tuple[slice, slice]]:
+def blocks_of(data: CellData, distance_mm: float) -> Iterator[tuple[slice, slice]]:
+    """Yield rows and columns of blocks, so small that angles hardly differ within one."""
     cell_mm = abs(float(data.x_mm[1] - data.x_mm[0])) if data.x_mm.size > 1 else 1.0
     side_mm = 2 * np.radians(_LARGEST_ANGLE) * distance_mm
     side = int(np.clip(side_mm / cell_mm, 1, _MOST_CELLS))

@@ -5,13 +5,18 @@ chi2 is a polynomial of degree four in the albedo, whose minimum Newton's method
 the least chi2 of the table and its neighbours give a polynomial, whose minimum is the fit. u: from
 the curvature of chi2, the other parameters being free (GUM, S. Brandt: Data Analysis, chapter 9).
 
+Several channels of a colour camera have one sigma: the sum of their chi2 is least there, and each
+has an albedo and ks of its own.
+
 Albedo and ks have no upper bound here, unlike in `analysis.fit`, so that noise about an albedo of 1
 is not cut off. A negative ks counts as 0.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +30,7 @@ _POINTS, _MIDDLE = 5, 2  # of the polynomial over sigma
 _COARSE, _MOVES = 3, 6  # every third value of the table finds the place; moves of the polynomial
 _TO_COEFFICIENTS = np.linalg.inv(np.vander(np.arange(_POINTS) - _MIDDLE, increasing=True))
 _TINY = 1e-300
+_U_OF_KS = "variance_ks", "by_sigma_ks"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +72,9 @@ class _LobeSums(NamedTuple):
     y: FloatArray
 
 
+_Channel = tuple[_Sums, _LobeSums | None]
+
+
 class _Profile(NamedTuple):
     """Least chi2 at each sigma (S, C), with albedo and ks there, and their variances."""
 
@@ -81,22 +90,64 @@ def fit_cells(table: SigmaTable, brdf: NDArray[np.floating], variance: FloatArra
 
     A value or variance that is NaN, or a variance of 0 or infinity, is left out of its cell.
     """
-    usable = np.isfinite(brdf) & np.isfinite(variance) & (variance > 0)
-    count = usable.sum(axis=0)
-    poor = count <= len(table.parameters)
-    weight = np.divide(1.0, variance, out=np.zeros(variance.shape), where=usable & ~poor)
-    y = np.where(usable, brdf, 0.0).astype(np.float64)
-    sums, lobe = _sums(table, y, weight)
-    fits = _minimum(table, sums, lobe)
-    if lobe is not None:
-        dark = fits["ks"] < 0
-        if dark.any():
-            without = _minimum(table, _Sums(*(a[..., dark] for a in sums)), None)
-            for name in ("albedo", "u_albedo", "sigma_deg", "u_sigma_deg", "chi2", "ks"):
-                fits[name][dark] = without[name]
-    for values in fits.values():
-        values[poor] = np.nan
-    return CellFits(**fits, count=count.astype(np.int64))
+    (fits,) = fit_channels(table, [brdf], [variance])
+    return fits
+
+
+def fit_channels(
+    table: SigmaTable,
+    brdf: Sequence[NDArray[np.floating]],
+    variance: Sequence[FloatArray],
+    own_share: Sequence[FloatArray] | None = None,
+) -> list[CellFits]:
+    """Fit C cells in several channels, as `fit_cells` does in one; sigma, chi2, count are common.
+
+    own_share: (C,) each, dimensionless factor of the variance of albedo and ks at a given sigma,
+    by which that of a channel alone differs from what `variance` states of it beside others.
+    """
+    usable = [
+        np.isfinite(y) & np.isfinite(v) & (v > 0) for y, v in zip(brdf, variance, strict=True)
+    ]
+    counts = [own.sum(axis=0) for own in usable]
+    poor = np.any([count <= len(table.parameters) for count in counts], axis=0)
+    channels = []
+    for y, v, own in zip(brdf, variance, usable, strict=True):
+        weight = np.divide(1.0, v, out=np.zeros(v.shape), where=own & ~poor)
+        channels.append(_sums(table, np.where(own, y, 0.0).astype(np.float64), weight))
+    shares = own_share or [np.ones(poor.shape) for _ in channels]
+    fits = _minimum(table, channels)
+    _without_dark_lobes(table, channels, fits)
+    for own, share in zip(fits, shares, strict=True):
+        _scale_u(own, share)
+        for values in own.values():
+            values[poor] = np.nan
+    count = np.sum(counts, axis=0).astype(np.int64)
+    return [CellFits(**own, count=count) for own in fits]
+
+
+def _scale_u(own: dict[str, FloatArray], share: FloatArray) -> None:
+    """Join the two parts of u of albedo and ks: at a given sigma, and by the u of sigma."""
+    for name in ("albedo", "ks"):
+        variance, by_sigma = own.pop(f"variance_{name}"), own.pop(f"by_sigma_{name}")
+        own[f"u_{name}"] = np.sqrt(np.maximum(variance, 0) * share + by_sigma**2)
+
+
+def _without_dark_lobes(
+    table: SigmaTable, channels: Sequence[_Channel], fits: Sequence[dict[str, FloatArray]]
+) -> None:
+    """Fit cells with a negative ks again, in place, without a lobe in those channels."""
+    if table.lobe is None:
+        return
+    dark = np.array([own["ks"] < 0 for own in fits])
+    if not dark.any():
+        return
+    for pattern in np.unique(dark[:, dark.any(axis=0)], axis=1).T:
+        cells = np.flatnonzero(np.all(dark == pattern[:, np.newaxis], axis=0))
+        parts = [_of_cells(c, cells, lit=not p) for c, p in zip(channels, pattern, strict=True)]
+        for own, again, p in zip(fits, _minimum(table, parts), pattern, strict=True):
+            for name, values in again.items():
+                if not (p and name in _U_OF_KS):  # that of the value which is less than 0
+                    own[name][cells] = values
 
 
 def _sums(table: SigmaTable, y: FloatArray, weight: FloatArray) -> tuple[_Sums, _LobeSums | None]:
@@ -150,32 +201,45 @@ def _profile(sums: _Sums, lobe: _LobeSums | None, steps: int = _NEWTON) -> _Prof
     return _Profile(chi2, a, ks, variance, variance_ks)
 
 
-def _minimum(table: SigmaTable, sums: _Sums, lobe: _LobeSums | None) -> dict[str, FloatArray]:
-    """Return values and u by name, (C,), at the least chi2 over sigma.
+def _minimum(table: SigmaTable, channels: Sequence[_Channel]) -> list[dict[str, FloatArray]]:
+    """Return values and u of each channel by name, (C,), at the least chi2 over sigma.
 
     A polynomial goes through five neighbours in the table, chosen by every third; where its least
     value is not near their middle, it is moved.
     """
-    first = _first_of_five(table, sums, lobe)
-    found = _of_five(table, sums, lobe, first)
+    first = _first_of_five(table, channels)
+    place, found = _of_five(table, channels, first)
     for _ in range(_MOVES):
-        off = np.abs(found["place"] - first - _MIDDLE) > 1
-        moved = _limited(table, np.rint(found["place"]).astype(np.int64) - _MIDDLE)
+        off = np.abs(place - first - _MIDDLE) > 1
+        moved = _limited(table, np.rint(place).astype(np.int64) - _MIDDLE)
         cells = np.flatnonzero(off & (moved != first))
         if not cells.size:
             break
         first[cells] = moved[cells]
-        part = None if lobe is None else _LobeSums(*(a[:, cells] for a in lobe))
-        again = _of_five(table, _Sums(*(a[:, cells] for a in sums)), part, moved[cells])
-        for name, values in again.items():
-            found[name][cells] = values
-    del found["place"]
+        parts = [_of_cells(channel, cells) for channel in channels]
+        place[cells], again = _of_five(table, parts, moved[cells])
+        for own, other in zip(found, again, strict=True):
+            for name, values in other.items():
+                own[name][cells] = values
     return found
 
 
-def _first_of_five(table: SigmaTable, sums: _Sums, lobe: _LobeSums | None) -> IntArray:
+def _of_cells(channel: _Channel, cells: IntArray, *, lit: bool = True) -> _Channel:
+    """Return the sums of some cells (N,); without those of a lobe if it is not `lit`."""
+    sums, lobe = channel
+    part = None if lobe is None or not lit else _LobeSums(*(a[:, cells] for a in lobe))
+    return _Sums(*(a[:, cells] for a in sums)), part
+
+
+def _total(chi2: Sequence[FloatArray]) -> FloatArray:
+    """Return the sum of the channels' chi2, (S, C) each."""
+    return reduce(np.add, chi2)
+
+
+def _first_of_five(table: SigmaTable, channels: Sequence[_Channel]) -> IntArray:
     """Return the first (C,) of five values in the table about the least chi2 of every third."""
-    chi2 = _profile(*_rows(sums, lobe, slice(None, None, _COARSE)), steps=2).chi2
+    every = slice(None, None, _COARSE)
+    chi2 = _total([_profile(*_rows(*own, every), steps=2).chi2 for own in channels])
     least = np.argmin(chi2, axis=0)
     inner = np.clip(least, 1, len(chi2) - 2)
     before, own, after = (chi2[inner + n, np.arange(inner.size)] for n in (-1, 0, 1))
@@ -198,28 +262,40 @@ def _limited(table: SigmaTable, first: IntArray) -> IntArray:
 
 
 def _of_five(
-    table: SigmaTable, sums: _Sums, lobe: _LobeSums | None, first: IntArray
-) -> dict[str, FloatArray]:
-    """Return values and u by name, (C,), of the polynomial through five values from `first` (C,).
+    table: SigmaTable, channels: Sequence[_Channel], first: IntArray
+) -> tuple[FloatArray, list[dict[str, FloatArray]]]:
+    """Return the place (C,) of sigma in the table, and values of each channel by name, (C,).
 
-    place: that of sigma in the table.
+    Of the polynomial through five values from `first` (C,).
     """
     rows, cells = np.abs(first + np.arange(_POINTS)[:, np.newaxis]), np.arange(first.size)
-    own = _profile(*_rows(sums, lobe, (rows, cells)))
+    profiles = [_profile(*_rows(*own, (rows, cells))) for own in channels]
+    chi2 = _total([own.chi2 for own in profiles])
     low = np.maximum(-first, 0) * 1.0
     high = np.minimum(table.sigma_deg.size - 1 - first, _POINTS - 1) * 1.0
-    t, bend = _least(own.chi2, low, high)
+    t, bend = _least(chi2, low, high)
     place = first + t
     sigma, by_place = table.sigma_at(place)
     on_bound = (place <= 0) | (place >= table.sigma_deg.size - 1)
     with np.errstate(divide="ignore", invalid="ignore"):
         u_place = np.sqrt(2 / np.where((bend > 0) & ~on_bound, bend, np.nan))
-    found = {"place": place, "sigma_deg": sigma, "u_sigma_deg": u_place * by_place}
+    common = {
+        "sigma_deg": sigma,
+        "u_sigma_deg": u_place * by_place,
+        "chi2": np.maximum(_interpolated(chi2, t)[0], 0.0),
+    }
+    return place, [
+        {**{n: a.copy() for n, a in common.items()}, **_at(own, t, u_place)} for own in profiles
+    ]
+
+
+def _at(own: _Profile, t: FloatArray, u_place: FloatArray) -> dict[str, FloatArray]:
+    """Return albedo and ks at places t (C,) with the two parts of their u, see `_scale_u`."""
+    found = {}
     for name in ("albedo", "ks"):
         found[name], by_t = _interpolated(getattr(own, name), t)
-        variance, _ = _interpolated(getattr(own, f"variance_{name}"), t)
-        found[f"u_{name}"] = np.sqrt(np.maximum(variance, 0) + np.nan_to_num(by_t * u_place) ** 2)
-    found["chi2"] = np.maximum(_interpolated(own.chi2, t)[0], 0.0)
+        found[f"variance_{name}"], _ = _interpolated(getattr(own, f"variance_{name}"), t)
+        found[f"by_sigma_{name}"] = np.nan_to_num(by_t * u_place)
     return found
 
 

@@ -22,9 +22,10 @@ from analysis.report.style import (
     svg_of,
     table_html,
 )
-from analysis.sample_maps.pictures import Panel, maps_html
+from analysis.sample_maps.pictures import Panel, maps_html, screen_colours
 from analysis.sample_maps.sample_map import UNITS, SampleMap
 from analysis.sample_maps.spread import Spread
+from instrument.devices import CHANNELS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +35,17 @@ if TYPE_CHECKING:
 _SHOWN_PERCENT, _SHOWN_U_PERCENT = (1.0, 99.0), (1.0, 94.0)
 _BINS = 80
 _HISTOGRAM_IN = 2.8
-_NAMES = {"albedo": "albedo", "sigma_deg": "σ (°)", "ks": "kₛ"}
+_NAMES = {
+    "albedo": "albedo",
+    "sigma_deg": "σ (°)",
+    "ks": "kₛ",
+    **{
+        f"{name}_{channel}": f"{label}, {colour}"
+        for name, label in (("albedo", "albedo"), ("ks", "kₛ"))
+        for channel, colour in zip(CHANNELS, ("red", "green", "blue"), strict=True)
+    },
+}
+_MOST_ACROSS = 3  # histograms
 _MOST_CHI2 = 3.0  # of the colours of chi2 over its expectation
 
 
@@ -104,23 +115,39 @@ def _pictures(found: SampleMap) -> str:
         "The colours span nearly all cells; a pointed end of their bar holds the rest. White: no "
         "fit."
     )
-    return f'<h2 id="maps">Maps</h2>\n{maps_html(found, panels, "Maps of the sample", caption)}'
+    drawn = maps_html(found, panels, "Maps of the sample", caption)
+    return f'<h2 id="maps">Maps</h2>\n{_in_colour(found)}{drawn}'
+
+
+def _in_colour(found: SampleMap) -> str:
+    """Return the picture of the albedo in colour; nothing for a camera of one channel."""
+    if found.colour is None:
+        return ""
+    panel = Panel("colour of the sample", screen_colours(found.colour), _SHOWN_PERCENT)
+    caption = (
+        "Albedo of each cell in the red, green and blue channel of the camera, as those of a "
+        "screen (sRGB): a white tile would be white. Light and angles are taken out. The channels "
+        "of a camera are not those of the eye; an albedo above 1 is drawn as 1, and cells without "
+        "a fit are left open."
+    )
+    return maps_html(found, [panel], "Albedo in colour", caption)
 
 
 def _numbers(found: SampleMap) -> str:
     rows = [_row(found, name, spread) for name in found.values if (spread := found.spread(name))]
     heads = ("Parameter", "#Median", "#Scatter", "#Explained by u", "#Beyond u", "#u shared")
-    table = table_html((*heads, "#Mean curve"), rows)
+    table, count = table_html((*heads, "#Mean curve"), rows), len(found.values)
 
     def draw(canvas: Figure, columns: int) -> None:
-        rows = -(-len(found.values) // columns)
+        rows = -(-count // columns)
         places = {"wspace": 0.25, "hspace": 0.35, **margins(canvas, 0.75, 0.15, 0.35, 0.6)}
         grid = canvas.add_gridspec(rows, columns, **places)
         for number, name in enumerate(found.values):
             _histogram(canvas.add_subplot(grid[divmod(number, columns)]), found, name)
 
-    count = len(found.values)
-    wide = svg_of(_HISTOGRAM_IN, partial(draw, columns=count), "histograms")
+    across = -(-count // -(-count // _MOST_ACROSS))
+    height_in = -(-count // across) * _HISTOGRAM_IN
+    wide = svg_of(height_in, partial(draw, columns=across), "histograms")
     tall = Drawing(count * _HISTOGRAM_IN, partial(draw, columns=1), NARROW_IN)
     narrow = embedded_svg(tall, "narrow-histograms")
     caption = (

@@ -22,7 +22,10 @@ _LARGEST_IN, _TALLEST = 4.2, 1.5  # side along x; height over it
 
 
 class Panel(NamedTuple):
-    """A map: its title, values (rows, columns) in one unit, and percentiles that colours span."""
+    """A map: its title, values (rows, columns) in one unit, and percentiles that colours span.
+
+    Values (rows, columns, 4) are the colours themselves, as of `screen_colours`.
+    """
 
     title: str
     values: FloatArray
@@ -63,23 +66,38 @@ def _drawing(found: SampleMap, panels: Sequence[Panel], columns: int, width_in: 
     return Drawing(total, draw, width_in)
 
 
+def screen_colours(albedo: FloatArray) -> FloatArray:
+    """Return the colours (rows, columns, 4) of albedos (rows, columns, 3) on a screen, 0 to 1.
+
+    By the curve of sRGB (IEC 61966-2-1); the fourth is 0 for a place without an albedo, else 1.
+    """
+    known = np.isfinite(albedo).all(axis=-1, keepdims=True)
+    linear = np.clip(np.where(known, albedo, 0.0), 0.0, 1.0)
+    curved = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.concatenate([curved, known.astype(np.float64)], axis=-1)
+
+
 def _draw_map(canvas: Figure, axes: Axes, bar: Axes, found: SampleMap, panel: Panel) -> None:
     values = panel.values
-    known = values[np.isfinite(values)]
-    low, high = np.percentile(known, panel.shown) if known.size else (0.0, 1.0)
-    if high - low < 1e-9 * max(abs(high), 1e-12):
-        low, high = low - 0.5 * abs(low or 1.0), high + 0.5 * abs(high or 1.0)
     half = found.cell_mm / 2
     extent = (
         found.x_mm[0] - half, found.x_mm[-1] + half, found.y_mm[-1] - half, found.y_mm[0] + half,
     )  # fmt: skip
-    drawn = axes.imshow(
-        values, vmin=low, vmax=high, extent=extent, cmap="viridis", interpolation="nearest"
-    )
     axes.grid(visible=False)
     axes.set_title(panel.title, color=INK, loc="left", pad=6)
     axes.set_xlabel("x (mm)")
     axes.set_ylabel("y (mm)", labelpad=1)
+    if values.ndim == found.chi2.ndim + 1:
+        axes.imshow(values, extent=extent, interpolation="nearest")
+        bar.remove()
+        return
+    known = values[np.isfinite(values)]
+    low, high = np.percentile(known, panel.shown) if known.size else (0.0, 1.0)
+    if high - low < 1e-9 * max(abs(high), 1e-12):
+        low, high = low - 0.5 * abs(low or 1.0), high + 0.5 * abs(high or 1.0)
+    drawn = axes.imshow(
+        values, vmin=low, vmax=high, extent=extent, cmap="viridis", interpolation="nearest"
+    )
     beyond = bool(np.any(known < low)), bool(np.any(known > high))
     ends = {(False, False): "neither", (True, False): "min", (False, True): "max"}
     canvas.colorbar(drawn, cax=bar, extend=ends.get(beyond, "both"))

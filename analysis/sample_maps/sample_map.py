@@ -8,9 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.sample_maps.spread import Spread, rejected, spread_of
+from instrument.devices import CHANNELS
 from instrument.geometry import BoolArray, FloatArray
 
-UNITS = {"albedo": "", "sigma_deg": "°", "ks": ""}
+UNITS = {
+    "albedo": "",
+    **{f"albedo_{channel}": "" for channel in CHANNELS},
+    "sigma_deg": "°",
+    "ks": "",
+    **{f"ks_{channel}": "" for channel in CHANNELS},
+}
+"""Units of all parameters that a map may have; those with a channel are of a colour camera."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +49,14 @@ class SampleMap:
     geometries: int
     height_mm: tuple[float, float]
     notes: tuple[str, ...] = ()
+
+    @property
+    def colour(self) -> FloatArray | None:
+        """Albedo (rows, columns, 3), dimensionless, in red, green and blue; None without colour."""
+        names = [f"albedo_{channel}" for channel in CHANNELS]
+        if not set(names) <= set(self.values):
+            return None
+        return np.stack([self.values[name] for name in names], axis=-1)
 
     @property
     def fitted(self) -> BoolArray:

@@ -32,20 +32,27 @@ def chi2_beyond_shared(
     if not usable.any():
         return fits.chi2
     u = np.sqrt(np.where(usable, variance, np.inf))
-    left = np.where(usable, brdf - _model(table, fits, known), 0.0) / u
+    left = np.where(usable, brdf - model_of(table, fits, known), 0.0) / u
     cells = np.maximum(usable.sum(axis=1), 1)
     level, per_u = np.where(usable, brdf / u, 0.0).sum(axis=1) / cells, (1 / u).sum(axis=1) / cells
-    by_parameter = _by_parameter(table, fits, known) * per_u[:, np.newaxis]
-    moves = np.hstack([by_parameter, shared * level[:, np.newaxis]])
+    own = by_parameter(table, fits, known) * per_u[:, np.newaxis]
+    moves = np.hstack([own, shared * level[:, np.newaxis]])
+    return np.where(known, chi2_without(moves, own.shape[1], left), np.nan)
+
+
+def chi2_without(moves: FloatArray, free: int, left: FloatArray) -> FloatArray:
+    """Return chi2 (C,) of what is left (N, C), in units of its u, beyond moves (N, M).
+
+    The first `free` moves have any size, each of the others about 1.
+    """
     product = moves.T @ moves
-    free = by_parameter.shape[1]
-    prior = np.r_[_TINY * np.diagonal(product)[:free], np.ones(shared.shape[1])]
+    prior = np.r_[_TINY * np.diagonal(product)[:free], np.ones(moves.shape[1] - free)]
     seen = moves.T @ left
     explained = np.sum(seen * np.linalg.solve(product + np.diag(prior), seen), axis=0)
-    return np.where(known, np.maximum(np.sum(left**2, axis=0) - explained, 0.0), np.nan)
+    return np.asarray(np.maximum(np.sum(left**2, axis=0) - explained, 0.0))
 
 
-def _model(table: SigmaTable, fits: CellFits, known: BoolArray) -> FloatArray:
+def model_of(table: SigmaTable, fits: CellFits, known: BoolArray) -> FloatArray:
     """Return the BRDF (K, C) in 1/sr of each cell's fit, 0 for cells without one."""
     place = table.place_of(np.where(known, fits.sigma_deg, table.sigma_deg[0]))
     at = _weights(place, table.sigma_deg.size)
@@ -66,7 +73,7 @@ def _weights(place: FloatArray, size: int) -> FloatArray:
     return weights
 
 
-def _by_parameter(table: SigmaTable, fits: CellFits, known: BoolArray) -> FloatArray:
+def by_parameter(table: SigmaTable, fits: CellFits, known: BoolArray) -> FloatArray:
     """Return the derivatives (K, P) of a usual cell's BRDF, in 1/sr by the parameters' units."""
     albedo, sigma, ks = (
         float(np.median(getattr(fits, name)[known])) for name in ("albedo", "sigma_deg", "ks")

@@ -14,6 +14,7 @@ from instrument.calibration.camera_calibration import CameraCalibration
 from instrument.calibration.response_curve import ResponseCurve
 from instrument.config.section import Finite, Name, NotNegative, Positive, Section
 from instrument.config.simulated.spread import Size, Spread
+from instrument.devices import CHANNELS
 
 V4L2_EXPOSURE_STEP_S = 1e-4
 # ITU-R BT.601: luma of limited range has black at 16 and white at 235.
@@ -58,7 +59,8 @@ class CameraConfig(Section):
     calibrate camera`, beside the rig file; counts are made linear with its response curve.
     `dark_patch`: its light is stray light, which is subtracted. `distortion`: relative displacement
     of a point at half the picture's diagonal, to the outside if positive, by the first radial term
-    of OpenCV's model; maps of the sample place their cells by it.
+    of OpenCV's model; maps of the sample place their cells by it. `channels`: 3 for a camera that
+    gives red, green and blue of each pixel; all other keys are of one channel.
     """
 
     width_px: Annotated[int, Field(ge=16, le=16384)]
@@ -69,6 +71,7 @@ class CameraConfig(Section):
     roll_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     distortion: Annotated[float, Field(ge=-0.2, le=0.2)] = 0.0
     bit_depth: Annotated[int, Field(ge=8, le=16)]
+    channels: Literal[1, 3] = 1
     full_well_electrons: Positive
     read_noise_electrons: NotNegative
     dark_current_electrons_per_s: NotNegative
@@ -105,7 +108,7 @@ class CameraConfig(Section):
         return np.asarray(np.take(table, counts, mode="clip"))
 
     def mistakes(self) -> Iterator[tuple[str, str]]:
-        """Check the order of exposures, the axis inside the image, and the black level."""
+        """Check the order of exposures, the axis inside the image, black level, and channels."""
         if self.min_exposure_s > self.max_exposure_s:
             yield (
                 "min_exposure_s",
@@ -116,6 +119,12 @@ class CameraConfig(Section):
             if not 0 <= value <= size - 1:
                 yield key, f"{value:g} is outside the image; allowed: 0 to {size - 1}"
         yield from self._patch_outside()
+        if self.is_colour and self.calibration is not None:
+            yield (
+                "calibration",
+                f"{self.calibration} with channels 3; allowed: none, as it is of one channel, and "
+                "the others have response curves of their own",
+            )
         if self.black_level_dn >= self.max_dn / 2:
             yield (
                 "black_level_dn",
@@ -144,6 +153,11 @@ class CameraConfig(Section):
                 text = f"from {middle - extent / 2:g} to {middle + extent / 2:g} mm leaves the "
                 low, high = sorted((n - axis) / (sign * per_mm) for n in (-0.5, size - 0.5))
                 yield "dark_patch", f"{text}picture; allowed: {low:.3g} to {high:.3g} mm"
+
+    @property
+    def is_colour(self) -> bool:
+        """True for a camera that gives three channels of each pixel."""
+        return self.channels == len(CHANNELS)
 
     @property
     def max_dn(self) -> int:
@@ -201,6 +215,8 @@ class V4l2CameraConfig(CameraConfig):
             steps = getattr(self, key) / V4L2_EXPOSURE_STEP_S
             if not 0.5 < steps < 1e15 or abs(steps - round(steps)) > 1e-6:
                 yield key, f"{getattr(self, key):g}; allowed: whole multiples of 0.0001 s"
+        if self.is_colour:
+            yield "channels", f"3; allowed for {self.pixel_format}: 1, as its pixels have one count"
         low, high = _BIT_DEPTHS[self.pixel_format]
         if not low <= self.bit_depth <= high:
             allowed = f"{low}" if low == high else f"{low} to {high}"

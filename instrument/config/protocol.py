@@ -14,7 +14,8 @@ import numpy as np
 from pydantic import Discriminator, Field, PrivateAttr, Tag
 
 from instrument.calibration.tile_table import TileTable
-from instrument.config.section import Finite, Name, NotNegative, Positive, Section
+from instrument.config.section import Name, NotNegative, Positive, Section
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.geometry import FloatArray
 
 SweepKey = Literal["theta_i_deg", "dphi_deg", "theta_r_deg"]
@@ -273,43 +274,6 @@ class FitConfig(Section):
                 "method",
                 f"{self.method}; allowed: auto, as `models` names the methods",
             )
-
-
-class Variation(Section):
-    """Places of a simulated sample with other `parameters` of its model than the rest.
-
-    `pattern`: `halves`, those at x > 0; `gradient`, to which all change evenly along x, from the
-    left edge to the right one; `patch`, a square of `size_mm` in the middle.
-    """
-
-    pattern: Literal["halves", "gradient", "patch"]
-    parameters: Annotated[dict[str, Finite], Field(min_length=1)]
-    size_mm: Annotated[float, Field(gt=0, le=500)] = 10.0
-
-
-class SimulatedSample(Section):
-    """True reflectance of the sample on a simulated rig; real rigs and the fit ignore it.
-
-    `method` of computing its reflectance; auto: the cheapest that is accurate enough for the image.
-    `mottling`: relative standard deviation of the albedo over the surface, in patches of
-    `mottling_size_mm`; its logarithm is normally distributed, so that no place reflects less than
-    nothing. `variation`: places with other parameters.
-    """
-
-    model: Name
-    parameters: dict[str, Finite]
-    method: Literal["auto", "exact"] = "auto"
-    mottling: Annotated[float, Field(ge=0, le=0.3)] = 0.0
-    mottling_size_mm: Annotated[float, Field(ge=0.2, le=1000)] = 2.0
-    variation: Variation | None = None
-
-    def with_share(self, share: float) -> SimulatedSample:
-        """Return the sample where `share` of the way to the variation's parameters is gone."""
-        if self.variation is None:
-            return self
-        other = {**self.parameters, **self.variation.parameters}
-        values = {k: (1 - share) * v + share * other[k] for k, v in self.parameters.items()}
-        return self.model_copy(update={"parameters": values})
 
 
 # Into a cell of a table: a spreadsheet takes a text that begins with = + - @ for a formula.

@@ -95,10 +95,12 @@ class Simulation(Section):
     `sample_height_mm`, `tile_height_mm`: distance of the surface from the rotation axis, towards
     the camera; that of the tile is added to an error of placement drawn from the seed.
     `lamp_drift_per_hour`: relative change of the lamp's output. `tile`: the white tile; without it,
-    matt, and as reflecting as the protocol says, but for an error of its u. `wall_light`: light of
-    the lamp that comes back from the surroundings, evenly from all directions: its irradiance
-    relative to the lamp's at normal incidence. `drawn`: the sizes of the defects are drawn from the
-    seed, with the spreads that the documentation of rig files lists.
+    matt, and as reflecting as the protocol says, but for an error of its u. `channel_responses`: of
+    the red, green and blue channel of a colour camera, relative to the electrons that the lamp is
+    stated to give; all 1 if omitted. `wall_light`: light of the lamp that comes back from the
+    surroundings, evenly from all directions: its irradiance relative to the lamp's at normal
+    incidence. `drawn`: the sizes of the defects are drawn from the seed, with the spreads that the
+    documentation of rig files lists.
     """
 
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
@@ -115,6 +117,7 @@ class Simulation(Section):
     sample_placement: Placement = Placement()
     tile_placement: Placement = Placement()
     tile: SimulatedTile | None = None
+    channel_responses: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = None
 
     def outside(self, width_px: int, height_px: int) -> Iterator[str]:
         """Yield the hot and dead pixels that lie outside an image of this size, in words."""
@@ -193,6 +196,11 @@ class Rig(Section):
                 "uncertainty",
                 f"stray_light {lines.stray_light:g}, u_stray_light {lines.u_stray_light:g}; "
                 "allowed with a dark_patch of the camera, which measures it: neither",
+            )
+        if self.simulation.channel_responses is not None and not self.camera.is_colour:
+            yield (
+                "simulation",
+                "channel_responses beside a camera of one channel; allowed: with channels: 3",
             )
         for text in self.simulation.outside(self.camera.width_px, self.camera.height_px):
             yield "simulation", text

@@ -14,7 +14,7 @@ import numpy as np
 from analysis.models import MODELS
 from analysis.models.base import Model, named_terms
 from analysis.models.smooth.fresnel import reflectances
-from instrument.config.protocol import SimulatedSample
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.geometry import Brdf, FloatArray, Geometry
 from sim.defects.mechanics import SeenAngles
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from instrument.clock import Clock
-from instrument.devices import Frame
+from instrument.devices import CHANNELS, Frame, Image, mono_picture
 from instrument.errors import DeviceError
 from sim.defects.camera import limit_range, read_back_s, true_exposure_s
 from sim.scene.scene import Scene
@@ -14,19 +18,24 @@ class SimulatedCamera:
     """Camera with the properties, and the defects, given in the rig file."""
 
     def __init__(self, scene: Scene, clock: Clock) -> None:
-        self._scene, self._sensor, self._clock = scene, Sensor(scene), clock
+        self._scene, self._clock = scene, clock
         self._settings, self._defects = scene.rig.camera, scene.rig.simulation.camera_defects
+        channels = range(len(CHANNELS)) if self._settings.is_colour else [None]
+        self._sensors = [Sensor(scene, channel) for channel in channels]
         self._set_s = self._settings.min_exposure_s
 
     def identity(self) -> str:
         """Return a description with size and bit depth."""
         s = self._settings
-        return f"simulated camera, {s.width_px} x {s.height_px} pixels, {s.bit_depth} bit"
+        colour = ", colour" if s.is_colour else ""
+        return f"simulated camera, {s.width_px} x {s.height_px} pixels, {s.bit_depth} bit{colour}"
 
     def settings(self) -> dict[str, str]:
         """Return size in pixels, bit depth, and the present gain in %."""
         s = self._settings
         size = {"size_px": f"{s.width_px} x {s.height_px}", "bit_depth": str(s.bit_depth)}
+        if s.is_colour:
+            size["channels"] = str(s.channels)
         return {**size, "gain": f"{100 * self._scene.world.gain:g}"}
 
     def set_exposure_s(self, exposure_s: float) -> float:
@@ -53,7 +62,19 @@ class SimulatedCamera:
         begin_s = self._clock.now_s() + self._settings.frame_overhead_s
         self._clock.sleep(self._settings.frame_overhead_s + exposure_s / 2)
         # In the middle: the mean of a drifting lamp.
-        image = self._sensor.picture(exposure_s, self._scene.poses_during(begin_s, exposure_s))
+        poses = self._scene.poses_during(begin_s, exposure_s)
+        pictures = [sensor.picture(exposure_s, poses) for sensor in self._sensors]
         self._clock.sleep(exposure_s / 2)
-        taken = limit_range(image, self._defects)
-        return Frame(taken, read_back_s(set_s, self._defects), self._clock.now_s())
+        taken = [limit_range(picture, self._defects) for picture in pictures]
+        image, colour = self._as_frame(taken)
+        read_s = read_back_s(set_s, self._defects)
+        return Frame(image, read_s, self._clock.now_s(), colour=colour)
+
+    def _as_frame(self, taken: Sequence[Image]) -> tuple[Image, Image | None]:
+        """Return the picture (rows, columns), and that of three channels where there are such."""
+        if len(taken) == 1:
+            return taken[0], None
+        colour = np.empty((*taken[0].shape, len(taken)), dtype=taken[0].dtype)
+        for n, picture in enumerate(taken):
+            colour[..., n] = picture
+        return mono_picture(colour, self._settings.max_dn), colour

@@ -22,16 +22,10 @@ from analysis.models import MODELS
 from instrument.board import Board
 from instrument.clock import Clock
 from instrument.config.camera import DarkPatch
-from instrument.config.protocol import (
-    Markers,
-    PatchConfig,
-    Protocol,
-    Sample,
-    SimulatedSample,
-    WhiteTile,
-)
+from instrument.config.protocol import Markers, PatchConfig, Protocol, Sample, WhiteTile
 from instrument.config.rig import Rig
 from instrument.config.simulated.defects import Placement
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.devices import BoardPlace, Surface
 from instrument.geometry import Brdf, FloatArray, IntArray
 from sim.clock import SimulatedClock

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import cv2
 import numpy as np
 
 from instrument.config.camera import CameraConfig
-from instrument.devices import Image
+from instrument.devices import GREEN, Image
 from sim.defects.camera import (
     bent,
     dark_current_factor,
@@ -32,13 +33,16 @@ class Sensor:
     only by its being dark), the exposure, and the frame's number since either last changed, so
     that repeating a step gives the same frames.
 
+    `channel`: of a colour camera, 0 for red, with the sample's albedo and the response there; None
+    for a camera of one. Each has noise of its own, green that of a camera of one channel.
+
     Photon noise is normal with the variance of the mean: above the few tens of electrons of the
     read noise its difference from a Poisson distribution is far below one count.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, channel: int | None = None) -> None:
         cv2.setNumThreads(1)  # images are so small that several threads are slower than one
-        self.scene = scene
+        self.scene, self._channel = scene, channel
         self._settings: CameraConfig = scene.rig.camera
         self._series: tuple[int, ...] = ()
         self._frame_number = 0
@@ -111,9 +115,20 @@ class Sensor:
         scene, own = self.scene, self.scene.true_deg
         scene.true_deg = pose
         try:
-            return electrons_per_s(scene)
+            return self._electrons_per_s()
         finally:
             scene.true_deg = own
+
+    def _electrons_per_s(self) -> FloatImage:
+        scene, channel = self.scene, self._channel
+        if channel is None:
+            return electrons_per_s(scene)
+        if scene.sample.mottling > 0:
+            scene.mottling()  # computed once, for all channels
+        own, responses = copy(scene), scene.rig.simulation.channel_responses
+        own.sample = scene.sample.in_channel(channel)
+        light = electrons_per_s(own)
+        return light if responses is None else light * np.float32(responses[channel])
 
     def _expected_dn(
         self, light: FloatImage, level: float, exposure_s: float, warmth: float
@@ -159,7 +174,8 @@ class Sensor:
 
     def _standard_normal(self) -> FloatImage:
         """Standard normal noise; OpenCV's generator is four times as fast here as NumPy's."""
-        key = [*self._series, self._frame_number]
+        own = [] if self._channel in (None, GREEN) else [1 + (self._channel or 0)]
+        key = [*self._series, self._frame_number, *own]
         cv2.setRNGSeed(int(np.random.SeedSequence(key).generate_state(1)[0] >> 1))
         cv2.randn(self._noise, np.zeros(1), np.ones(1))
         return self._noise

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from instrument.config.protocol import Sample, Variation
+from instrument.config.protocol import Sample
+from instrument.config.simulated.sample import Variation
 from instrument.geometry import FloatArray
 from instrument.pinhole import rectangle_mm
 

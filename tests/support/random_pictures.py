@@ -12,8 +12,9 @@ from acquisition.interlocks.picture.outline_check import U_TILT_DEG, OutlineChec
 from acquisition.plan.plan import Step
 from acquisition.plan.pose import Pose
 from instrument.config.load import Loaded, load_protocol
-from instrument.config.protocol import PatchConfig, Protocol, Sample, SimulatedSample
+from instrument.config.protocol import PatchConfig, Protocol, Sample
 from instrument.config.rig import Rig
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.devices import Image, Surface
 from instrument.pinhole import Pinhole
 from instrument.record.reading import Kind

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from instrument.config.protocol import SimulatedSample
+from instrument.config.simulated.sample import SimulatedSample
 from tests.support.whole_scans.coverage_scans import (
     Deviations,
     by_band,

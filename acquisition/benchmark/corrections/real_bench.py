@@ -16,8 +16,9 @@ from acquisition.benchmark.demo_scan import BINNING, binned, shipped_demo, shipp
 from instrument.calibration.tile_table import TileTable
 from instrument.config.camera import DarkPatch
 from instrument.config.load import Loaded
-from instrument.config.protocol import DriftCheck, References, SimulatedSample, WhiteTile
+from instrument.config.protocol import DriftCheck, References, WhiteTile
 from instrument.config.rig import Rig, SimulatedTile, Simulation
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.geometry import FloatArray
 
 SAMPLES = (

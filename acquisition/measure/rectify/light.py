@@ -21,6 +21,7 @@ from instrument.geometry import BoolArray
 from instrument.pinhole import Pinhole
 
 FloatImage = NDArray[np.float32]
+_PLANE = 2  # axes of a picture without colour
 
 
 def light_dn(
@@ -70,6 +71,16 @@ def window_dn(
     own = light[window.crop]
     known = np.isfinite(own)
     return float(np.sum(area[known] * own[known]) / max(float(area[known].sum()), 1e-30))
+
+
+def channels_of(picture: NDArray[Any]) -> list[NDArray[Any]]:
+    """Return the channels (rows, columns) each of a picture in any unit, one if it has no colour.
+
+    picture: (rows, columns), or (rows, columns, channels).
+    """
+    if picture.ndim == _PLANE:
+        return [picture]
+    return [np.ascontiguousarray(channel) for channel in np.moveaxis(picture, -1, 0)]
 
 
 @lru_cache(maxsize=2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from acquisition.measure.hot_pixels import find_hot_pixels
 from acquisition.measure.rectify.cell_grid import CellGrid
 from acquisition.measure.rectify.kept_files import cells_name, dark_name, step_of
-from acquisition.measure.rectify.light import FloatImage, light_dn
+from acquisition.measure.rectify.light import FloatImage, channels_of, light_dn, window_dn
 from acquisition.measure.rectify.of_sample import cells_of
 from acquisition.results.maps.surface_height import at_height, smoothing
+from instrument.config.camera import CameraConfig
 from instrument.config.load import Loaded
+from instrument.devices import GREEN, mono_picture
 from instrument.errors import InputError
 from instrument.geometry import BoolArray, FloatArray
 from instrument.pinhole import Pinhole
@@ -67,9 +69,27 @@ class CellSource(Protocol):
         """Return the cells in which the height of the surface is looked for."""
 
     def light(
-        self, readings: Sequence[Reading], grid: CellGrid, height_mm: float = 0.0
-    ) -> CellLight:
-        """Return the light, in DN, of the cells (K, rows, columns) of a surface at a height."""
+        self,
+        readings: Sequence[Reading],
+        grid: CellGrid,
+        height_mm: float = 0.0,
+        channels: Sequence[int] | None = None,
+    ) -> list[CellLight]:
+        """Return the light, in DN, of the cells (K, rows, columns) of a surface at a height.
+
+        channels: of a colour camera, those wanted; None for that of the mono picture.
+        """
+
+    def tile_windows(self, readings: Sequence[Reading]) -> FloatArray:
+        """Return the light (K, 3), in DN, of the window in readings of a tile, by channel.
+
+        Raises `InputError` for those that were not kept.
+        """
+
+
+def _wanted(channels: Sequence[int] | None, camera: CameraConfig) -> tuple[int, ...]:
+    """Return the numbers of the channels wanted; that of the mono picture for None."""
+    return tuple(channels) if channels is not None else (GREEN if camera.is_colour else 0,)
 
 
 class KeptCells:
@@ -81,6 +101,7 @@ class KeptCells:
     def __init__(self, record: Record, loaded: Loaded, grid: CellGrid) -> None:
         maps = loaded.protocol.maps
         self._run, self._grid, self._pinhole = record.folder, grid, Pinhole.of(loaded.rig)
+        self._camera = loaded.rig.camera
         self.without_dark: set[float] = set()
         self.u_height = _U_HEIGHT
         if maps is None or grid != CellGrid.of(loaded.protocol.sample, loaded.rig, maps.cell_mm):
@@ -103,32 +124,42 @@ class KeptCells:
         return self._grid
 
     def light(
-        self, readings: Sequence[Reading], grid: CellGrid, height_mm: float = 0.0
-    ) -> CellLight:
+        self,
+        readings: Sequence[Reading],
+        grid: CellGrid,
+        height_mm: float = 0.0,
+        channels: Sequence[int] | None = None,
+    ) -> list[CellLight]:
         """Return the light of the cells (K, rows, columns), in DN, of a band of the rows.
 
         They were rectified for a surface on the axis, and are moved to the height.
         """
         first = round(float(self._grid.y_mm[0] - grid.y_mm[0]) / grid.cell_mm)
-        rows = slice(first, first + grid.rows)
-        cells = np.empty((len(readings), grid.rows, grid.columns), dtype=np.float32)
-        window = np.empty(len(readings))
+        rows, wanted = slice(first, first + grid.rows), _wanted(channels, self._camera)
+        cells = np.empty((len(wanted), len(readings), grid.rows, grid.columns), dtype=np.float32)
+        window, each = np.empty((len(wanted), len(readings))), self._camera.channels
+        size = 1 + self._grid.rows * self._grid.columns
         for k, reading in enumerate(readings):
-            values = self._read(reading.step)
-            whole = values[1:].reshape(self._grid.rows, -1)
-            at = at_height(whole, reading.theta_r_deg, height_mm, self._grid, self._pinhole)
-            window[k], cells[k] = values[0], at[rows]
+            values = self._read(reading.step, each * size).reshape(each, size)[list(wanted)]
+            for n, own in enumerate(values):
+                whole = own[1:].reshape(self._grid.rows, -1)
+                at = at_height(whole, reading.theta_r_deg, height_mm, self._grid, self._pinhole)
+                window[n, k], cells[n, k] = own[0], at[rows]
         theta_r_deg = np.array([r.theta_r_deg for r in readings])
         moved = smoothing(theta_r_deg, height_mm, grid.cell_mm)
         # Twice what a smooth texture loses: means of cells hide the half of a sharp one.
-        return CellLight(cells, window, moved, 1 - moved)
+        return [CellLight(*own, moved, 1 - moved) for own in zip(cells, window, strict=True)]
+
+    def tile_windows(self, readings: Sequence[Reading]) -> FloatArray:
+        """Return the light (K, 3), in DN, of the window in readings of a tile, by channel."""
+        return np.array([self._read(r.step, self._camera.channels) for r in readings], np.float64)
 
     def _path(self, step: int) -> Path:
         return self._run / cells_name(step)
 
-    def _read(self, step: int) -> NDArray[np.float32]:
-        """Return window and cells in one row; raises `InputError` for a file of anything else."""
-        size, path = 1 + self._grid.rows * self._grid.columns, self._path(step)
+    def _read(self, step: int, size: int) -> NDArray[np.float32]:
+        """Return windows and cells in one row; raises `InputError` for a file of anything else."""
+        path = self._path(step)
         try:
             data = read_file(path, 4 * size + 4096)
             values = np.load(io.BytesIO(data), allow_pickle=False)
@@ -162,7 +193,7 @@ class KeptFrames:
         self._pinhole, self._protocol = Pinhole.of(loaded.rig), loaded.protocol
         self._names = _by_step(record)
         self._means = {exposure_s: mean for exposure_s, _, mean, _ in record.darks()}
-        self._darks: dict[float, tuple[FloatImage | float, BoolArray | None]] = {}
+        self._darks: dict[float, list[tuple[FloatImage | float, BoolArray | None]]] = {}
         self.without_dark: set[float] = set()
         self.u_height = 0.0
 
@@ -190,49 +221,86 @@ class KeptFrames:
         return CellGrid(cell_mm, rows, columns)
 
     def light(
-        self, readings: Sequence[Reading], grid: CellGrid, height_mm: float = 0.0
-    ) -> CellLight:
+        self,
+        readings: Sequence[Reading],
+        grid: CellGrid,
+        height_mm: float = 0.0,
+        channels: Sequence[int] | None = None,
+    ) -> list[CellLight]:
         """Return the light of the cells in these readings, whose darks are read first."""
-        for exposure_s in {r.exposure_s for r in readings}:
-            self._darks.setdefault(exposure_s, self._dark(exposure_s))
-        cells = np.empty((len(readings), grid.rows, grid.columns), dtype=np.float32)
-        window = np.empty(len(readings))
+        self._read_darks(readings)
+        wanted, count = _wanted(channels, self._camera), len(readings)
+        cells = np.empty((len(wanted), count, grid.rows, grid.columns), dtype=np.float32)
+        window = np.empty((len(wanted), count))
 
         def read(k: int) -> None:
-            window[k], cells[k] = self._cells(readings[k], grid, height_mm)
+            found = self._cells(readings[k], grid, height_mm, wanted)
+            for n, (own_window, own) in enumerate(found):
+                window[n, k], cells[n, k] = own_window, own
 
         with ThreadPoolExecutor(_WORKERS) as pool:
-            for _ in pool.map(read, range(len(readings))):
+            for _ in pool.map(read, range(count)):
                 pass
-        return CellLight(cells, window, np.ones(len(readings)), np.zeros(len(readings)))
+        each = zip(cells, window, strict=True)
+        return [CellLight(*own, np.ones(count), np.zeros(count)) for own in each]
+
+    def tile_windows(self, readings: Sequence[Reading]) -> FloatArray:
+        """Return the light (K, 3), in DN, of the window in readings of a tile, by channel."""
+        self.require(readings)
+        self._read_darks(readings)
+        found, patch = [], self._protocol.window
+        for r in readings:
+            lights = self._lights(r, self._pictures(r), range(self._camera.channels))
+            found.append([window_dn(own, r.theta_r_deg, self._pinhole, patch) for own in lights])
+        return np.array(found)
 
     def _cells(
-        self, reading: Reading, grid: CellGrid, height_mm: float
-    ) -> tuple[float, FloatImage]:
-        """Return the light of the window and of the cells (rows, columns), in DN."""
-        images = [self._image(name) for name in self._names[reading.step]]
-        dark, hot = self._darks[reading.exposure_s]
-        light = light_dn(images, dark, hot, self._camera, self._pinhole)
-        return cells_of(
-            light, images[0], reading.theta_r_deg, grid, self._pinhole, self._protocol, height_mm
-        )
+        self, reading: Reading, grid: CellGrid, height_mm: float, channels: Sequence[int]
+    ) -> Iterator[tuple[float, FloatImage]]:
+        """Yield the light of the window and of the cells (rows, columns), in DN, by channel."""
+        pictures, camera = self._pictures(reading), self._camera
+        image = mono_picture(pictures[0], camera.max_dn) if camera.is_colour else pictures[0]
+        for light in self._lights(reading, pictures, channels):
+            yield cells_of(
+                light, image, reading.theta_r_deg, grid, self._pinhole, self._protocol, height_mm
+            )
 
-    def _dark(self, exposure_s: float) -> tuple[FloatImage | float, BoolArray | None]:
+    def _pictures(self, reading: Reading) -> list[NDArray[Any]]:
+        return [self._picture(name) for name in self._names[reading.step]]
+
+    def _lights(
+        self, reading: Reading, pictures: Sequence[NDArray[Any]], channels: Sequence[int]
+    ) -> Iterator[FloatImage]:
+        """Yield the light of each pixel (rows, columns), in DN, in these channels."""
+        each = list(zip(*(channels_of(picture) for picture in pictures), strict=True))
+        for channel in channels:
+            dark, hot = self._darks[reading.exposure_s][channel]
+            yield light_dn(each[channel], dark, hot, self._camera, self._pinhole)
+
+    def _read_darks(self, readings: Sequence[Reading]) -> None:
+        for exposure_s in {r.exposure_s for r in readings} - self._darks.keys():
+            self._darks[exposure_s] = self._dark(exposure_s)
+
+    def _dark(self, exposure_s: float) -> list[tuple[FloatImage | float, BoolArray | None]]:
         name = dark_name(exposure_s)
         if (self._run / name).is_file():
-            dark = self._image(name, np.dtype(np.float32))
-            return dark, find_hot_pixels(dark.astype(np.float64), self._camera)
+            darks = channels_of(self._picture(name, np.dtype(np.float32)))
+            return [(own, find_hot_pixels(own.astype(np.float64), self._camera)) for own in darks]
         self.without_dark.add(exposure_s)
-        return self._means.get(exposure_s, float(self._camera.black_level_dn)), None
+        mean = self._means.get(exposure_s, float(self._camera.black_level_dn))
+        return [(mean, None)] * self._camera.channels
 
-    def _image(self, name: str, kind: np.dtype[Any] | None = None) -> NDArray[Any]:
-        """Return the picture in a file, (rows, columns); raises `InputError` for any other."""
+    def _picture(self, name: str, kind: np.dtype[Any] | None = None) -> NDArray[Any]:
+        """Return the picture in a file, (rows, columns) and channels; or raise `InputError`."""
         import cv2
 
-        path, shape = self._run / name, (self._camera.height_px, self._camera.width_px)
-        least = np.dtype(np.uint8 if self._camera.bit_depth == 8 else np.uint16)
+        camera, path = self._camera, self._run / name
+        size = camera.height_px, camera.width_px
+        shape = (*size, camera.channels) if camera.is_colour else size
+        least = np.dtype(np.uint8 if camera.bit_depth == 8 else np.uint16)
         try:
-            data = np.frombuffer(read_file(path, 16 * shape[0] * shape[1] + 65536), np.uint8)
+            most = 16 * camera.channels * size[0] * size[1] + 65536
+            data = np.frombuffer(read_file(path, most), np.uint8)
             image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
         except (OSError, ValueError) as error:
             raise InputError(f"{path}: cannot be read: {error}") from None
@@ -242,7 +310,7 @@ class KeptFrames:
                 f"{path}: {found}; allowed: a TIFF of {shape} and {kind or least}, as the scan "
                 "wrote it"
             )
-        return np.asarray(image)
+        return np.asarray(image[..., ::-1] if camera.is_colour else image)  # OpenCV has blue first
 
 
 def _by_step(record: Record) -> Mapping[int, list[str]]:

@@ -16,19 +16,27 @@ from acquisition.results.maps.cell_brdf import (
     places_of,
     usable,
 )
-from acquisition.results.maps.kept_cells import CellSource, cell_source
+from acquisition.results.maps.channels import (
+    ALL,
+    Channel,
+    Run,
+    channels_of_run,
+    mean_values,
+    shared_by_channels,
+)
+from acquisition.results.maps.kept_cells import CellLight, CellSource, cell_source
 from acquisition.results.maps.mean_curve import MeanCurve
 from acquisition.results.maps.surface_height import Height, find_height, searched_views
-from acquisition.results.maps.u_shared import UnknownHeight, u_shared
+from acquisition.results.maps.u_shared import UnknownHeight
 from acquisition.results.maps.vignetting import Vignetting
 from acquisition.results.reduction import Reduced, reduced_run, require_usable
 from analysis.sample_maps.block_fit import CellData, fit_blocks
+from analysis.sample_maps.colour.channel_fit import fit_channel_blocks
 from analysis.sample_maps.places import TableField
-from analysis.sample_maps.sample_map import SampleMap
+from analysis.sample_maps.sample_map import UNITS, SampleMap
 from instrument.config.load import Loaded
 from instrument.errors import InputError, NotDetermined
 from instrument.geometry import BoolArray, FloatArray
-from instrument.record.reading import Reading
 from instrument.record.record import Record
 
 _USUAL_MM = 0.5
@@ -56,10 +64,10 @@ def map_sample(
             f"{record.folder}: no reading with kept frames resolves cells of {cell_mm:g} mm: name "
             "larger ones"
         )
-    readings = [p for p, own in zip(reduced.points, kept, strict=True) if own]
-    frames.require(readings)
-    curve = MeanCurve.of(_subset(reduced, kept), loaded, model)
-    return _Mapping(frames, readings, curve, grid, loaded).made(reduced)
+    run = Run(record, loaded, frames, _subset(reduced, kept), kept)
+    frames.require(run.readings)
+    curve = MeanCurve.of(run.reduced, loaded, model)
+    return _Mapping(run, curve, grid).made(reduced)
 
 
 def usual_cell_mm(loaded: Loaded) -> float:
@@ -88,28 +96,42 @@ class _Mapping:
 
     def __init__(
         self,
-        frames: CellSource,
-        readings: Sequence[Reading],
+        run: Run,
         curve: MeanCurve,
         grid: CellGrid,
-        loaded: Loaded,
     ) -> None:
-        self._frames, self._readings, self._curve = frames, readings, curve
-        self._grid, self._loaded = grid, loaded
-        self._theta_r_deg = np.array([r.theta_r_deg for r in readings])
+        self._run, self._frames, self._loaded = run, run.source, run.loaded
+        self._readings, self._curve, self._grid = run.readings, curve, grid
+        self._theta_r_deg = np.array([r.theta_r_deg for r in self._readings])
+        # Nothing but a white tile tells the responses of the channels.
+        self._in_colour = run.loaded.rig.camera.is_colour and not curve.relative
+        self._channels = [] if self._in_colour else [Channel(self._readings, curve)]
 
     def made(self, reduced: Reduced) -> SampleMap:
         """Return the map."""
         height = self._height()
         tables, maps = self._tables(height), []
+        wanted = ALL if self._in_colour else None
         for band in self._bands():
-            light = self._frames.light(self._readings, band, height.mm)
-            data = cell_data(light, self._readings, self._curve, band, self._loaded)
-            data = in_own_light(data, self._readings, height, light.blur, self._loaded.rig)
-            data = self._with_shared(data, height)
-            maps.append(fit_blocks(data, tables, self._nearest_mm()))
+            lights = self._frames.light(self._readings, band, height.mm, wanted)
+            if not self._channels:
+                self._channels = channels_of_run(self._run, lights, self._curve)
+            data = [
+                self._data(channel, light, band, height)
+                for channel, light in zip(self._channels, lights, strict=True)
+            ]
+            if self._in_colour:
+                maps.append(fit_channel_blocks(data, tables, self._nearest_mm()))
+            else:
+                maps.append(fit_blocks(data[0], tables, self._nearest_mm()))
         whole = {name: np.concatenate([m[name] for m in maps]) for name in maps[0]}
         return self._as_map(whole, data, height, reduced)
+
+    def _data(self, channel: Channel, light: CellLight, band: CellGrid, height: Height) -> CellData:
+        """Return the cells of a band of rows in one channel."""
+        data = cell_data(light, channel.readings, channel.curve, band, self._loaded)
+        data = in_own_light(data, channel.readings, height, light.blur, self._loaded.rig)
+        return self._with_shared(data, height)
 
     def _tables(self, height: Height) -> TableField:
         grid, places = self._grid, places_of(self._readings, self._loaded.rig, height.mm)
@@ -125,7 +147,7 @@ class _Mapping:
 
     def _bands(self) -> list[CellGrid]:
         per_row = 4 * len(self._readings) * self._grid.columns
-        rows = max(1, _MOST_BYTES // per_row)
+        rows = max(1, _MOST_BYTES // (per_row * (len(ALL) if self._in_colour else 1)))
         return [self._grid.band(k, k + rows) for k in range(0, self._grid.rows, rows)]
 
     def _with_shared(self, data: CellData, height: Height) -> CellData:
@@ -143,7 +165,7 @@ class _Mapping:
         readings, grid = [self._readings[k] for k in some], self._frames.search_grid()
 
         def light(height_mm: float) -> NDArray[np.float32]:
-            found = self._frames.light(readings, grid, height_mm)
+            (found,) = self._frames.light(readings, grid, height_mm)
             found.cells[...] /= found.window[:, np.newaxis, np.newaxis]
             leave_out_edges(found.cells, readings, grid, self._loaded)
             return found.cells
@@ -153,30 +175,26 @@ class _Mapping:
         return replace(found, u_mm=float(u_mm))
 
     def _u_shared(
-        self, maps: dict[str, FloatArray], data: CellData, height: Height
+        self, maps: dict[str, FloatArray], data: Sequence[CellData], height: Height
     ) -> dict[str, FloatArray]:
         u_mm = min(height.u_mm, self._loaded.rig.u_placement_mm)
-        found = u_shared(
-            {name: maps[name] for name in self._curve.values},
-            self._curve,
-            data,
-            UnknownHeight(u_mm, self._u_height(height), self._theta_r_deg),
-        )
-        # All light of a place counts alike: it is taken for albedo, and for ks.
+        unknown = UnknownHeight(u_mm, self._u_height(height), self._theta_r_deg)
         u = Vignetting(self._loaded.rig, self._loaded.protocol.window).u_relative(self._grid)
-        return {
-            name: own if name == "sigma_deg" else np.hypot(own, u * np.abs(maps[name]))
-            for name, own in found.items()
-        }
+        return shared_by_channels(self._channels, maps, data, unknown, u)
 
     def _nearest_mm(self) -> float:
         return min(self._loaded.rig.beam_length_mm, self._loaded.rig.lamp_distance_mm)
 
     def _as_map(
-        self, maps: dict[str, FloatArray], data: CellData, height: Height, reduced: Reduced
+        self,
+        maps: dict[str, FloatArray],
+        data: Sequence[CellData],
+        height: Height,
+        reduced: Reduced,
     ) -> SampleMap:
         protocol, curve = self._loaded.protocol, self._curve
-        names = tuple(curve.values)
+        mean = mean_values(self._channels)
+        names = sorted(mean, key=list(UNITS).index)
         if not np.isfinite(maps["chi2"]).any():
             unseen = ": two or more markers must be seen in a picture, for it to count"
             raise NotDetermined(
@@ -194,7 +212,7 @@ class _Mapping:
             values={name: maps[name] for name in names},
             u_own={name: maps[f"u_{name}"] for name in names},
             u_shared=self._u_shared(maps, data, height),
-            mean={name: (value, curve.fit.u[name]) for name, value in curve.values.items()},
+            mean=mean,
             chi2=maps["chi2"],
             count=maps["count"],
             geometries=len(self._readings),
@@ -224,6 +242,16 @@ class _Mapping:
             found.append(
                 "no white tile was measured: albedo and ks count relative to one another, and the "
                 "lamp's levels are those of the mean curve"
+            )
+        if self._in_colour:
+            found.append(
+                "the channels of the camera have one sigma; the white tile is taken as equally "
+                "reflecting in all of them"
+            )
+        elif self._loaded.rig.camera.is_colour:
+            found.append(
+                "of the colour camera the green channel is mapped: a white tile, which would tell "
+                "the responses of the channels, was not measured"
             )
         return found
 

@@ -27,7 +27,7 @@ from acquisition.measure.radiometry import (
 from acquisition.measure.window import window_at
 from acquisition.results.reduction import reduced_run
 from instrument.config.camera import CameraDefects
-from instrument.config.protocol import SimulatedSample
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.devices import Frame
 from instrument.pinhole import Pinhole
 from instrument.record.record import Record

@@ -11,7 +11,7 @@ from acquisition.measure.placement import Placement, placement_u_dn, tilt_deg
 from acquisition.measure.window import window_at
 from analysis.models import MODELS
 from instrument.config.load import Loaded, load_protocol
-from instrument.config.protocol import SimulatedSample
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.devices import Frame
 from instrument.geometry import FloatArray, Geometry
 from instrument.pinhole import Pinhole

@@ -11,8 +11,8 @@ from numpy.polynomial.legendre import leggauss
 from acquisition.measure.window import window_at
 from analysis.models import MODELS
 from instrument.config.load import Loaded, load_protocol
-from instrument.config.protocol import SimulatedSample
 from instrument.config.rig import Rig
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.geometry import FloatArray, Geometry, camera_direction, lamp_direction
 from instrument.pinhole import Pinhole, apply_homography
 from sim.scene.render import electrons_per_s

@@ -3,7 +3,7 @@
 import pytest
 
 from instrument.config.camera import V4l2CameraConfig
-from tests.support.config.texts import RIG, changed, load, problems
+from tests.support.config.texts import PROTOCOL, RIG, changed, load, problems
 
 
 def test_two_mistakes_of_a_camera_are_both_reported() -> None:
@@ -95,3 +95,62 @@ def test_a_dark_patch_must_lie_in_the_picture_and_beside_the_sample() -> None:
     (covered,) = problems(rig=with_dark_patch(28.0))
     assert covered.startswith("protocol.yaml:3:32: sample.width_mm: 50 mm; allowed: at most 48 mm")
     assert "dark patch is covered (rig.yaml:26)" in covered
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "  bit_depth: 12",
+            "  bit_depth: 12\n  channels: 3\n  calibration: camera.npz",
+            "camera.calibration: camera.npz with channels 3; allowed: none, as it is of one",
+        ),
+        (
+            "  bit_depth: 12",
+            "  bit_depth: 12\n  channels: 2",
+            "camera.channels: 2 is none of these; allowed: 1 or 3",
+        ),
+        (
+            "lamp:",
+            "simulation: {channel_responses: [0.5, 1.0, 0.7]}\nlamp:",
+            "simulation: channel_responses beside a camera of one channel; allowed: with channels:",
+        ),
+    ],
+)
+def test_what_cannot_work_in_colour_is_refused(old: str, new: str, message: str) -> None:
+    found = problems(rig=changed(RIG, old, new))
+    assert any(message in p for p in found), found
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "20}",
+            "20}\n  channel_albedos: [0.8, 1.2, 0.1]",
+            "channel_albedos[1]: 1.2 is too large; allowed",
+        ),
+        (
+            "  parameters: {albedo: 0.8, sigma_deg: 20}",
+            "  parameters: {sigma_deg: 20}\n  channel_albedos: [0.8, 0.2, 0.1]",
+            "simulated_sample.channel_albedos: beside parameters without an albedo; allowed",
+        ),
+        (
+            "20}",
+            "20}\n  variation: {pattern: halves, parameters: {sigma_deg: 5},"
+            " channel_albedos: [0.8, 0.2, 0.1]}",
+            "simulated_sample.channel_albedos: is missing of the sample; allowed: of both or",
+        ),
+    ],
+)
+def test_albedos_of_channels_that_make_no_sample_are_refused(
+    old: str, new: str, message: str
+) -> None:
+    found = problems(changed(PROTOCOL, old, new))
+    assert any(message in p for p in found), found
+
+
+def test_no_pixel_format_of_one_count_has_three_channels() -> None:
+    rig = changed(RIG, "camera:\n  driver: simulated", YUYV)
+    rig = changed(rig, "bit_depth: 12", "bit_depth: 8\n  channels: 3")
+    assert any("camera.channels: 3; allowed for YUYV: 1" in p for p in problems(rig=rig))

@@ -12,11 +12,11 @@ from instrument.config.protocol import (
     FitConfig,
     Metadata,
     Protocol,
-    SimulatedSample,
     Steps,
     WhiteTile,
     angles_deg,
 )
+from instrument.config.simulated.sample import SimulatedSample
 from tests.support.config.texts import PROTOCOL
 
 

@@ -13,9 +13,9 @@ import pytest
 
 from acquisition.results.reduction import reduced_run
 from instrument.config.load import Loaded, load_protocol
-from instrument.config.protocol import SimulatedSample
 from instrument.config.rig import Simulation
 from instrument.config.section import Section
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.config.simulated.spread import Spread
 from instrument.devices import Image
 from instrument.record.reading import Reading

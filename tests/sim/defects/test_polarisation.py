@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.models import MODELS
-from instrument.config.protocol import SimulatedSample
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.geometry import FloatArray, Geometry
 from sim.defects.mechanics import SeenAngles
 from sim.defects.polarisation import INDEX, body_factor, facet_factor, polarised

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from instrument.config.load import Loaded
+from instrument.devices import TRUSTED_SHARE
 from instrument.errors import DeviceError
 from sim.clock import SimulatedClock
 from sim.scene.camera import SimulatedCamera
@@ -51,3 +52,34 @@ def test_a_frame_of_a_moving_axis_shows_the_mean_over_its_exposure(demo: Loaded)
     expected = gain * np.mean(steps, axis=0) + loaded.rig.camera.black_level_dn
     assert np.mean(image - expected) == pytest.approx(0.0, abs=1.5)
     assert np.mean(image) == pytest.approx(np.mean(expected), rel=2e-3)
+
+
+def test_a_colour_camera_shows_green_as_its_picture_and_no_saturated_pixel_as_sound(
+    demo: Loaded,
+) -> None:
+    loaded = replace(demo, rig=shrunk(demo, 10).rig)
+    camera = loaded.rig.camera.model_copy(update={"channels": 3})
+    simulation = loaded.rig.simulation.model_copy(update={"channel_responses": [1.6, 1.0, 0.5]})
+    in_colour = loaded.rig.model_copy(update={"camera": camera, "simulation": simulation})
+    frames = []
+    for rig in (loaded.rig, in_colour):
+        own = SimulatedCamera(simulated_scene(replace(loaded, rig=rig)), SimulatedClock())
+        own.set_exposure_s(0.005)
+        frames.append(own.grab(1)[0])
+    mono, frame = frames
+    assert mono.colour is None
+    assert frame.colour is not None
+    assert np.array_equal(frame.colour[..., 1], mono.image)
+    light = frame.colour.astype(float) - camera.black_level_dn
+    bright = light[..., 1] > 500
+    assert light[bright][:, 0] / light[bright][:, 1] == pytest.approx(1.6, abs=0.2)
+    assert light[bright][:, 2] / light[bright][:, 1] == pytest.approx(0.5, abs=0.1)
+    own = SimulatedCamera(simulated_scene(replace(loaded, rig=in_colour)), SimulatedClock())
+    own.set_exposure_s(0.005 * 0.75 * camera.max_dn / float(light[..., 1].max()))
+    frame = own.grab(1)[0]
+    assert frame.colour is not None
+    trusted = frame.colour < TRUSTED_SHARE * camera.max_dn
+    lost = trusted[..., 1] & ~trusted[..., 0]
+    assert lost.any()
+    assert np.all(frame.image[lost] == camera.max_dn)
+    assert np.array_equal(frame.image[trusted.all(-1)], frame.colour[trusted.all(-1)][:, 1])

@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from instrument.config.load import Loaded
-from instrument.config.protocol import SimulatedSample
+from instrument.config.simulated.sample import SimulatedSample
 from sim.scene.render import electrons_per_s
 from sim.scene.scene import log_normal
 from tests.support.scans import changed, simulated_scene

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from instrument.config.load import Loaded
-from instrument.config.protocol import SimulatedSample, Variation
+from instrument.config.simulated.sample import SimulatedSample, Variation
 from instrument.geometry import FloatArray
 from instrument.pinhole import Pinhole
 from sim.scene.render import electrons_per_s

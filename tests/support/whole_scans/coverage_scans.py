@@ -24,7 +24,8 @@ from analysis.data.measurements import Measurements
 from analysis.fit.fit import fit
 from analysis.models import MODELS
 from instrument.config.load import Loaded, load_protocol
-from instrument.config.protocol import DriftCheck, References, SimulatedSample, WhiteTile
+from instrument.config.protocol import DriftCheck, References, WhiteTile
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.devices import Request
 from instrument.geometry import FloatArray, Geometry
 from instrument.pinhole import Pinhole

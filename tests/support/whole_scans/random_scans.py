@@ -11,14 +11,9 @@ import yaml
 from acquisition.plan.plan import make_plan
 from instrument.config.camera import CameraDefects, HotPixel
 from instrument.config.load import Loaded, load_protocol
-from instrument.config.protocol import (
-    DriftCheck,
-    PatchConfig,
-    References,
-    SimulatedSample,
-    WhiteTile,
-)
+from instrument.config.protocol import DriftCheck, PatchConfig, References, WhiteTile
 from instrument.config.rig import Rig
+from instrument.config.simulated.sample import SimulatedSample
 from sim.faults.faults import Faults
 from tests.support.paths import CONFIGS
 from tests.support.scans import changed, shrunk

@@ -18,8 +18,9 @@ from acquisition.results.fitting import measurements
 from acquisition.results.reduction import reduced_run
 from analysis.data.measurements import Measurements
 from instrument.config.load import Loaded, load_protocol
-from instrument.config.protocol import DriftCheck, References, SimulatedSample
+from instrument.config.protocol import DriftCheck, References
 from instrument.config.rig import Rig, Simulation
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.record.record import Record
 from tests.support.paths import CONFIGS
 from tests.support.scans import changed, shrunk

@@ -20,7 +20,7 @@ from acquisition.results.reduction import reduced_run
 from acquisition.rig import open_devices
 from instrument.config.camera import CameraDefects
 from instrument.config.load import Loaded
-from instrument.config.protocol import SimulatedSample
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.devices import Camera, Frame
 from instrument.errors import DeviceError
 from instrument.record.record import Record

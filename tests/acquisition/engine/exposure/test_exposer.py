@@ -11,7 +11,7 @@ from acquisition.engine.exposure.search import ExposureSearch
 from acquisition.measure.window import Window
 from acquisition.rig import open_devices
 from instrument.config.load import Loaded, load_protocol
-from instrument.config.protocol import SimulatedSample
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.devices import Frame
 from instrument.record.record import Record
 from tests.support.paths import CONFIGS

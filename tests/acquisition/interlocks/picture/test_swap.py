@@ -7,7 +7,7 @@ import pytest
 from acquisition.interlocks.picture.swap import SwapCheck
 from acquisition.plan.pose import Pose
 from instrument.config.load import load_protocol
-from instrument.config.protocol import SimulatedSample
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.devices import Frame
 from instrument.errors import Interlock
 from instrument.record.record import Record

@@ -19,8 +19,8 @@ from acquisition.results.effects.surface import TILT, surface_effects
 from analysis.models import MODELS
 from instrument.config.camera import CameraDefects
 from instrument.config.load import Loaded
-from instrument.config.protocol import SimulatedSample
 from instrument.config.rig import Simulation
+from instrument.config.simulated.sample import SimulatedSample
 from instrument.config.uncertainty.rig_lines import RigLines
 from instrument.devices import Surface
 from instrument.geometry import FloatArray, Geometry
