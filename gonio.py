@@ -2,7 +2,8 @@
 
 Runs: `load` a measured one, `plan` and `run` a protocol. Tables: `read_table`, `read_curet`, or
 `Measurements.bare` for arrays. `fit` finds the simplest model that explains any of them. `MODELS`
-are the reflectance models by name, `Geometry` the directions that they take.
+are the reflectance models by name, `Geometry` the directions that they take. `open_rig` and
+`gonio_scan` are for bluesky's run engine.
 
 Every array names its unit. Errors are `GonioError`: `InputError` for a mistake in a file or an
 argument, `DeviceError`, `StorageError`, and `NotDetermined` where the data allow no fit.
@@ -10,6 +11,8 @@ argument, `DeviceError`, `StorageError`, and `NotDetermined` where the data allo
 
 from __future__ import annotations
 
+from acquisition.facility.devices.rig_devices import open_rig
+from acquisition.facility.plans import gonio_scan
 from acquisition.notebook.fits import Fit, fit
 from acquisition.notebook.runs import Run, load
 from acquisition.notebook.scans import PlannedScan, plan, run
@@ -41,7 +44,9 @@ __all__ = [
     "StorageError",
     "Table",
     "fit",
+    "gonio_scan",
     "load",
+    "open_rig",
     "plan",
     "read_curet",
     "read_table",

@@ -99,12 +99,18 @@ def open_devices(loaded: Loaded, faults: Faults | None = None) -> Devices:
 
     `faults` of a simulated rig, or those in the environment: see `sim.faults.faults`.
     """
+    return open_all(loaded.rig, None if loaded.rig.real else _scene(loaded), faults)
+
+
+def open_all(rig: Rig, scene: Scene | None = None, faults: Faults | None = None) -> Devices:
+    """Open every device of a rig; without a scene, a simulated one shows a white sample."""
     with ExitStack() as opening:
-        scene = None if loaded.rig.real else _scene(loaded)
-        rig = opening.enter_context(OpenRig(loaded.rig, scene, faults))
-        axes = {name: rig.axis(name) for name in AXES}
-        camera = rig.camera()
-        devices = Devices(axes, camera, rig.lamp, rig.operator, rig.clock, rig.begin_step)
+        opened = opening.enter_context(OpenRig(rig, scene, faults))
+        axes = {name: opened.axis(name) for name in AXES}
+        camera = opened.camera()
+        devices = Devices(
+            axes, camera, opened.lamp, opened.operator, opened.clock, opened.begin_step
+        )
         return replace(devices, close=opening.pop_all().close)
 
 

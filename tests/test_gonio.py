@@ -10,7 +10,7 @@ import pytest
 import gonio
 from tests.support.paths import ROOT
 
-FUNCTIONS = ("load", "read_table", "read_curet", "fit", "plan", "run")
+FUNCTIONS = ("load", "read_table", "read_curet", "fit", "plan", "run", "open_rig", "gonio_scan")
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

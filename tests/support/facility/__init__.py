@@ -1,0 +1,1 @@
+"""Helpers for tests of rigs that other programs drive."""
