@@ -19,6 +19,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from instrument.config.load import Loaded, load_protocol
 from sim.scene.render import electrons_per_s
+from tests.support.analysis.no_charts import leave_charts_out
 from tests.support.paths import CONFIGS
 from tests.support.remembered_light import RememberedLight
 from tests.support.storage.memory_folder import RAM, has_room
@@ -99,14 +100,10 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 @pytest.fixture(scope="module", autouse=True)
 def _charts_where_asked_for(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Reports made in this process have empty pictures, except in modules marked `charts`.
-
-    Drawing takes more than half of the time of a small run.
-    """
+    """Reports made in this process have empty pictures, except in modules marked `charts`."""
     with pytest.MonkeyPatch.context() as patch:
         if not request.node.get_closest_marker("charts"):
-            patch.setattr("analysis.report.figure_list.embedded_svg", lambda *_: "<svg></svg>")
-            patch.setattr("analysis.report.page.rendered_html", lambda *_: "")
+            leave_charts_out(patch)
         yield
 
 

@@ -72,6 +72,7 @@ class EmulatedBench:
     def __init__(self, scene: Scene, clock: Clock) -> None:
         self._scene, self._clock = scene, clock
         self.motors: dict[str, Motor] = {}
+        self._shown_deg: dict[str, float] = {}
         self._closing = ExitStack()
 
     def close(self) -> None:
@@ -123,8 +124,10 @@ class EmulatedBench:
         """Copy of the scene at the start of an exposure, with the motors' angles and motions."""
         scene, motions = self._scene, dict[str, Callable[[float], float]]()
         for name, motor in self.motors.items():
-            axis = scene.rig.axes[name]
-            scene.set_axis(name, axis.from_device_deg(motor.position_deg))
+            axis, angle_deg = scene.rig.axes[name], motor.position_deg
+            if self._shown_deg.get(name) != angle_deg:
+                scene.set_axis(name, axis.from_device_deg(angle_deg))
+                self._shown_deg[name] = angle_deg
             if (motion := motor.motion()) is not None:
                 motions[name] = partial(_rig_angle_deg, axis.from_device_deg, motion)
         return replace(scene, true_deg=dict(scene.true_deg), motions=motions)

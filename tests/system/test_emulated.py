@@ -214,7 +214,7 @@ def test_an_axis_that_turns_is_measured_at_the_angles_of_its_frames(
     text["simulated_sample"]["parameters"] |= {"sigma_deg": 8.0, "ks": 0.3}
     flown, rig, folder = tmp_path / "flown.yaml", tmp_path / "rig.yaml", tmp_path / "run"
     flown.write_text(yaml.safe_dump(text))
-    rig.write_text(quick_emulated_rig())
+    rig.write_text(quick_emulated_rig().replace("frames_per_s: 400", "frames_per_s: 100"))
     done = command.run("run", flown, "--rig", rig, "--out", folder, "--json")
     assert done.returncode == 0, done.stderr
     fit = json.loads(done.stdout)

@@ -78,4 +78,5 @@ class FreeRunningSensor:
 
     def _wait_until(self, until_s: float) -> bool:
         """Wait until a time; return False if the sensor was stopped meanwhile."""
-        return not self._stopping.wait(max(until_s - time.monotonic(), 0.0))
+        left_s = until_s - time.monotonic()
+        return not (self._stopping.wait(left_s) if left_s > 0 else self._stopping.is_set())

@@ -21,8 +21,11 @@ from tests.support.adaptive.predicted_bench import PredictedBench, adaptive_scan
 from tests.support.scans import changed
 
 
-@pytest.mark.parametrize("batches", [2, 4])
-def test_readings_of_the_last_batch_do_not_matter(batches: int, tmp_path: Path) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("batches", [2, 3, 4])
+def test_readings_of_the_last_batch_do_not_matter(batches: int, slow: bool, tmp_path: Path) -> None:
+    if not slow and batches != 3:
+        pytest.skip("with --slow")
     bench = PredictedBench(adaptive_scan("sigma_deg=0.01"), seed=batches)
     with bench.create(tmp_path / "run") as record:
         while len(batches_of(record.events())) < batches:

@@ -215,6 +215,7 @@ def dull_demo(folder: Path, model: str, fit: str) -> Path:
     return protocol
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tile", "model", "block", "options"),
     [
@@ -225,9 +226,11 @@ def dull_demo(folder: Path, model: str, fit: str) -> Path:
     ],
 )
 def test_a_run_and_its_table_are_fitted_as_at_the_run_s_end(
-    tile: bool, model: str, block: str, options: tuple[str, ...], tmp_path: Path
+    tile: bool, model: str, block: str, options: tuple[str, ...], slow: bool, tmp_path: Path
 ) -> None:
     """Fits of the folder follow the protocol's `fit:`; a table has the numbers alone."""
+    if not (slow or block):
+        pytest.skip("with --slow: the next case makes a choice of its own too")
     protocol = dull_demo(tmp_path, model, block)
     if not tile:
         protocol.write_text(re.sub(r"  white_tile:.*\n", "", protocol.read_text()))

@@ -68,13 +68,14 @@ class Bench:
         return replace(frame, image=image)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bits", BITS)
 @pytest.mark.parametrize("gain", [0.25, 1.0, 4.0])
-def test_sound_frames_keep_their_values_and_their_u(bits: int, gain: float) -> None:
+def test_sound_frames_keep_their_values_and_their_u(bits: int, gain: float, slow: bool) -> None:
     """Also of a camera whose full well is not that of the rig file: dark, bright and saturated."""
     for count, shape, level in itertools.product(COUNTS, SHAPES, LEVELS):
         bench = Bench(bits, shape, gain=gain)
-        for _ in range(6):
+        for _ in range(6 if slow else 2):
             signal, judged = bench.signals(bench.frames([level] * count))
             assert judged == signal, (count, shape, level)
         assert not bench.events

@@ -1,7 +1,8 @@
 """Calls in processes of their own that need not import anything: forks of one that has done so.
 
 For tests whose subject belongs to a process, such as its signals or a preloaded library. The fork
-has no threads and no terminal; it ends as a process does that was started with `python -m`.
+has no threads and no terminal; it ends as a process does that was started with `python -m`. Its
+reports have no charts.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from tests.support.paths import ROOT
 COMMAND = "acquisition.entry:main"
 COMMAND_MODULES = (
     "acquisition.cli", "acquisition.commands.scan", "acquisition.commands.setup",
-    "acquisition.results.finish", "matplotlib.backends.backend_svg",
+    "acquisition.results.finish", "analysis.report.page",
 )  # fmt: skip
 PATIENCE_S = 120.0
 

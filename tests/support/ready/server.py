@@ -12,6 +12,8 @@ import sys
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from tests.support.analysis.no_charts import leave_charts_out
+
 
 def main() -> None:
     """Serve requests until the pipe is closed; in a fork, return from the call."""
@@ -19,6 +21,7 @@ def main() -> None:
     module, _, function = sys.argv[2].partition(":")
     for name in (*sys.argv[3:], module):
         importlib.import_module(name)
+    leave_charts_out()
     while True:
         try:
             arguments, environment, folder = pipe.recv()

@@ -66,7 +66,7 @@ def test_all_accepted_readings_survive_a_power_cut_at_any_moment(
     with Record.open(Path(root) / "deep" / "run") as record:
         whole = {r.step: replace(r, time_utc="") for r in record.readings()}
     looked = 0
-    for number, disk in cuts(log, 1 if slow else 40):
+    for number, disk in cuts(log, 1 if slow else 80):
         for draw in (None, *(random.Random(1000 * number + n) for n in range(draws))):
             left = tmp_path / "left"
             left.mkdir()

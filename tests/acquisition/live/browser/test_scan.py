@@ -38,7 +38,8 @@ pytestmark = [
 def rig(tmp_path: Path) -> Path:
     """The emulated rig, in real time, that settles so long that a busy browser can keep up."""
     path = tmp_path / "rig.yaml"
-    before, axis, theta_r = quick_emulated_rig().partition("theta_r:")
+    fewer_frames = quick_emulated_rig().replace("frames_per_s: 400", "frames_per_s: 100")
+    before, axis, theta_r = fewer_frames.partition("theta_r:")
     path.write_text(before + axis + theta_r.replace("settle_s: 0.0", "settle_s: 1.5"))
     return path
 

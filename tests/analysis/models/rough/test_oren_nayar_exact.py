@@ -50,8 +50,13 @@ def reference(theta_i: float, theta_r: float, dphi: float) -> FloatArray:
     return np.asarray(total[1:] / total[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angles", GEOMETRIES)
-def test_exact_to_1e_6_from_smooth_to_very_rough(angles: tuple[float, float, float]) -> None:
+def test_exact_to_1e_6_from_smooth_to_very_rough(
+    angles: tuple[float, float, float], slow: bool
+) -> None:
+    if not (slow or angles in GEOMETRIES[::2]):
+        pytest.skip("with --slow")
     theta_i, theta_r, dphi = angles
     geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
     direct, twice = reference(*np.radians(angles))
