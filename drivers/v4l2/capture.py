@@ -217,21 +217,25 @@ class Capture:
         return Arrival(stamp_s, _NO_STATE if self.requires_buffer_state else "")
 
     def image(self) -> Image | None:
-        """Return the frame taken last, (height, width) in counts, or None if its size is wrong.
+        """Return the frame taken last in counts, or None if its size is wrong.
 
-        The array owns its memory.
+        (height, width), or (height, width, 3) in colour: red, green, blue. The array owns its
+        memory.
         """
         good, image = self._video.retrieve()
         if not good or image.shape != self._settings.shape:
             return None
-        wide = self._settings.pixel_format in ("Y10", "Y16")
-        if image.dtype != (np.uint16 if wide else np.uint8):
+        if image.dtype != (np.uint16 if self._settings.wide else np.uint8):
             return None
+        if self._settings.is_colour:
+            colour: NDArray[Any] = image
+            swapped = self._settings.pixel_format == "BGR3"
+            return np.ascontiguousarray(colour[..., ::-1]) if swapped else colour.copy()
         luma: NDArray[Any] = image[:, :, 0] if image.ndim == 3 else image
         return luma if luma.base is None else luma.copy()
 
     def check_counts(self, image: Image) -> None:
-        """Raise if an image, (height, width), has more counts than the bit depth allows."""
+        """Raise if an image, (height, width) or in colour, has more counts than the bits allow."""
         greatest = self._settings.checked_max_dn
         if greatest is None or (found := int(image.max())) <= greatest:
             return

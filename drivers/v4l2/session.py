@@ -10,7 +10,7 @@ from drivers.v4l2.frame_filter import FrameFilter
 from drivers.v4l2.settings import BUFFERS, V4l2Settings
 from drivers.v4l2.worker_thread import Heartbeat
 from instrument.clock import Clock
-from instrument.devices import Frame
+from instrument.devices import Frame, mono_picture
 
 log = logging.getLogger(__name__)
 
@@ -115,4 +115,8 @@ class Session:
         self._capture.check_counts(image)
         device_time_s = arrival.stamp_s if self.traits.monotonic else None
         sequence = arrival.sequence if self.traits.counts_frames else None
-        return Frame(image, self.exposure_s, self._clock.now_s(), device_time_s, sequence), ""
+        stamps = self.exposure_s, self._clock.now_s(), device_time_s, sequence
+        if not self._settings.is_colour:
+            return Frame(image, *stamps), ""
+        mono = mono_picture(image, 2**self._settings.bit_depth - 1)
+        return Frame(mono, *stamps, colour=image), ""

@@ -7,7 +7,9 @@ from typing import Literal
 
 from instrument.errors import DeviceError
 
-PixelFormat = Literal["GREY", "Y10", "Y16", "YUYV"]
+PixelFormat = Literal["GREY", "Y10", "Y16", "YUYV", "RGB3", "BGR3"]
+_BYTES: dict[PixelFormat, int] = {"GREY": 1, "Y10": 2, "Y16": 2, "YUYV": 2, "RGB3": 3, "BGR3": 3}
+_COLOUR: tuple[PixelFormat, ...] = "RGB3", "BGR3"
 STEPS_PER_S = 10_000  # V4L2_CID_EXPOSURE_ABSOLUTE counts 100 µs
 
 BUFFERS = 4  # of the stream: one is read while others fill
@@ -42,18 +44,30 @@ class V4l2Settings:
     @property
     def bytes_per_line(self) -> int:
         """Bytes per row of pixels."""
-        return self.width_px * (1 if self.pixel_format == "GREY" else 2)
+        return self.width_px * _BYTES[self.pixel_format]
+
+    @property
+    def is_colour(self) -> bool:
+        """True for a format with a count of red, green and blue for each pixel."""
+        return self.pixel_format in _COLOUR
+
+    @property
+    def wide(self) -> bool:
+        """True for counts of 16 bits."""
+        return self.pixel_format in ("Y10", "Y16")
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape of the array returned by OpenCV."""
         size = (self.height_px, self.width_px)
-        return (*size, 2) if self.pixel_format == "YUYV" else size
+        if self.is_colour or self.pixel_format == "YUYV":
+            return (*size, _BYTES[self.pixel_format])
+        return size
 
     @property
     def checked_max_dn(self) -> int | None:
         """Largest possible count of a pixel; None if the pixel format cannot hold a larger one."""
-        room = 8 if self.pixel_format in ("GREY", "YUYV") else 16
+        room = 16 if self.wide else 8
         return 2**self.bit_depth - 1 if self.bit_depth < room else None
 
     def exposure_steps(self, exposure_s: float) -> int:

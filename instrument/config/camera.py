@@ -19,7 +19,10 @@ from instrument.devices import CHANNELS
 V4L2_EXPOSURE_STEP_S = 1e-4
 # ITU-R BT.601: luma of limited range has black at 16 and white at 235.
 LIMITED_BLACK_DN, LIMITED_WHITE_DN = 16, 235
-_BIT_DEPTHS = {"GREY": (8, 8), "YUYV": (8, 8), "Y10": (10, 10), "Y16": (9, 16)}
+_BIT_DEPTHS = {
+    "GREY": (8, 8), "YUYV": (8, 8), "Y10": (10, 10), "Y16": (9, 16), "RGB3": (8, 8), "BGR3": (8, 8),
+}  # fmt: skip
+_COLOUR_FORMATS = ("RGB3", "BGR3")
 
 
 @lru_cache(maxsize=4)
@@ -192,7 +195,7 @@ class V4l2CameraConfig(CameraConfig):
 
     driver: Literal["v4l2"]
     device: Name
-    pixel_format: Literal["GREY", "Y10", "Y16", "YUYV"]
+    pixel_format: Literal["GREY", "Y10", "Y16", "YUYV", "RGB3", "BGR3"]
     gain: int | None = None
     exposure_delay_frames: Annotated[int, Field(ge=0, le=20)] = 2
     frames_per_s: Annotated[int, Field(ge=1, le=1000)] | None = None
@@ -215,8 +218,11 @@ class V4l2CameraConfig(CameraConfig):
             steps = getattr(self, key) / V4L2_EXPOSURE_STEP_S
             if not 0.5 < steps < 1e15 or abs(steps - round(steps)) > 1e-6:
                 yield key, f"{getattr(self, key):g}; allowed: whole multiples of 0.0001 s"
-        if self.is_colour:
-            yield "channels", f"3; allowed for {self.pixel_format}: 1, as its pixels have one count"
+        if self.is_colour != (self.pixel_format in _COLOUR_FORMATS):
+            allowed = "1, as its pixels have one count; in colour: RGB3 or BGR3"
+            if not self.is_colour:
+                allowed = "3, as its pixels have three counts"
+            yield "channels", f"{self.channels}; allowed for {self.pixel_format}: {allowed}"
         low, high = _BIT_DEPTHS[self.pixel_format]
         if not low <= self.bit_depth <= high:
             allowed = f"{low}" if low == high else f"{low} to {high}"

@@ -33,7 +33,7 @@ from sim.emulated.v4l2.shim import compile_shim, shim_environment
 from sim.emulated.wire import Controller, PtyWire
 from sim.emulated.zaber_controller import ZaberController
 from sim.scene.scene import Scene
-from sim.scene.sensor import Sensor
+from sim.scene.sensor import in_one, sensors_of
 
 CAMERA_DEVICE = "/dev/v4l/by-id/emulated-gonio-camera"
 _SOCKET = "GONIO_V4L2_SOCKET"
@@ -106,16 +106,16 @@ class EmulatedBench:
     def camera(self, camera: V4l2CameraConfig) -> EmulatedCamera:
         """Return the camera, which takes pictures of the scene."""
         self._scene.mottling()  # computed once, shared by all snapshots
-        sensor, lock = Sensor(self._scene), threading.Lock()
+        sensors, lock = sensors_of(self._scene), threading.Lock()
 
         def render(exposure: Exposure, snapshot: object) -> Image:
             with lock:
-                exposure_s = exposure.exposure_s
-                if not isinstance(snapshot, Scene):
-                    return sensor.picture(exposure_s)
-                sensor.scene = snapshot
-                poses = snapshot.poses_during(exposure.start_s, exposure_s)
-                return sensor.picture(exposure_s, poses)
+                exposure_s, poses = exposure.exposure_s, tuple[dict[str, float], ...]()
+                if isinstance(snapshot, Scene):
+                    poses = snapshot.poses_during(exposure.start_s, exposure_s)
+                    for sensor in sensors:
+                        sensor.scene = snapshot
+                return in_one([sensor.picture(exposure_s, poses) for sensor in sensors])
 
         capabilities = _capabilities(camera, self._scene.rig.simulation.camera_defects)
         return EmulatedCamera(render, self._snapshot, capabilities)

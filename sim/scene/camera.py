@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import numpy as np
-
 from instrument.clock import Clock
-from instrument.devices import CHANNELS, Frame, Image, mono_picture
+from instrument.devices import Frame, mono_picture
 from instrument.errors import DeviceError
 from sim.defects.camera import limit_range, read_back_s, true_exposure_s
 from sim.scene.scene import Scene
-from sim.scene.sensor import Sensor
+from sim.scene.sensor import in_one, sensors_of
 
 
 class SimulatedCamera:
@@ -20,8 +16,7 @@ class SimulatedCamera:
     def __init__(self, scene: Scene, clock: Clock) -> None:
         self._scene, self._clock = scene, clock
         self._settings, self._defects = scene.rig.camera, scene.rig.simulation.camera_defects
-        channels = range(len(CHANNELS)) if self._settings.is_colour else [None]
-        self._sensors = [Sensor(scene, channel) for channel in channels]
+        self._sensors = sensors_of(scene)
         self._set_s = self._settings.min_exposure_s
 
     def identity(self) -> str:
@@ -66,15 +61,8 @@ class SimulatedCamera:
         pictures = [sensor.picture(exposure_s, poses) for sensor in self._sensors]
         self._clock.sleep(exposure_s / 2)
         taken = [limit_range(picture, self._defects) for picture in pictures]
-        image, colour = self._as_frame(taken)
-        read_s = read_back_s(set_s, self._defects)
-        return Frame(image, read_s, self._clock.now_s(), colour=colour)
-
-    def _as_frame(self, taken: Sequence[Image]) -> tuple[Image, Image | None]:
-        """Return the picture (rows, columns), and that of three channels where there are such."""
-        if len(taken) == 1:
-            return taken[0], None
-        colour = np.empty((*taken[0].shape, len(taken)), dtype=taken[0].dtype)
-        for n, picture in enumerate(taken):
-            colour[..., n] = picture
-        return mono_picture(colour, self._settings.max_dn), colour
+        image, read_s = in_one(taken), read_back_s(set_s, self._defects)
+        if not self._settings.is_colour:
+            return Frame(image, read_s, self._clock.now_s())
+        mono = mono_picture(image, self._settings.max_dn)
+        return Frame(mono, read_s, self._clock.now_s(), colour=image)

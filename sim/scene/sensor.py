@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from instrument.config.camera import CameraConfig
-from instrument.devices import GREEN, Image
+from instrument.devices import CHANNELS, GREEN, Image
 from sim.defects.camera import (
     bent,
     dark_current_factor,
@@ -179,6 +179,26 @@ class Sensor:
         cv2.setRNGSeed(int(np.random.SeedSequence(key).generate_state(1)[0] >> 1))
         cv2.randn(self._noise, np.zeros(1), np.ones(1))
         return self._noise
+
+
+def sensors_of(scene: Scene) -> list[Sensor]:
+    """Return the sensors of the rig's camera: one, or one for each channel of a colour camera."""
+    if not scene.rig.camera.is_colour:
+        return [Sensor(scene)]
+    return [Sensor(scene, channel) for channel in range(len(CHANNELS))]
+
+
+def in_one(pictures: Sequence[Image]) -> Image:
+    """Return pictures (rows, columns) of channels, in counts, as one (rows, columns, channels).
+
+    A single one stays as it is.
+    """
+    if len(pictures) == 1:
+        return pictures[0]
+    colour = np.empty((*pictures[0].shape, len(pictures)), dtype=pictures[0].dtype)
+    for n, picture in enumerate(pictures):
+        colour[..., n] = picture
+    return colour
 
 
 def _mean_of(lights: Sequence[FloatImage]) -> FloatImage:

@@ -30,8 +30,10 @@ from drivers.v4l2 import ioctl
 from instrument.config.camera import CameraDefects
 from sim.defects.camera import limit_range, read_back_s, true_exposure_s
 
-PixelFormat = Literal["GREY", "Y10", "Y16", "YUYV"]
-BYTES_PER_PIXEL: Mapping[PixelFormat, int] = {"GREY": 1, "Y10": 2, "Y16": 2, "YUYV": 2}
+PixelFormat = Literal["GREY", "Y10", "Y16", "YUYV", "RGB3", "BGR3"]
+BYTES_PER_PIXEL: Mapping[PixelFormat, int] = {
+    "GREY": 1, "Y10": 2, "Y16": 2, "YUYV": 2, "RGB3": 3, "BGR3": 3,
+}  # fmt: skip
 BadFrame = Literal["flagged", "short"]
 _NEUTRAL_CHROMA = 128  # U and V of grey
 BRIGHTNESS = 0x980900  # V4L2_CID_BRIGHTNESS; changes no counts here
@@ -293,5 +295,7 @@ class EmulatedCamera:
             image = np.dstack(
                 [image.astype(np.uint8), np.full(image.shape, _NEUTRAL_CHROMA, np.uint8)]
             )
+        if exposure.pixel_format == "BGR3":
+            image = image[..., ::-1]
         wide = exposure.pixel_format in ("Y10", "Y16")
         return np.ascontiguousarray(image, "<u2" if wide else np.uint8).view(np.uint8).ravel()

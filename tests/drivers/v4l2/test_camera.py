@@ -90,6 +90,27 @@ def test_counts_arrive_exactly(
             assert np.array_equal(frame.image, sent)
 
 
+@pytest.mark.parametrize("pixel_format", ["RGB3", "BGR3"])
+def test_colours_arrive_exactly_and_the_picture_is_green(
+    remote: RemoteCamera, scene: LevelScene, pixel_format: PixelFormat
+) -> None:
+    sent = np.random.default_rng(3).integers(0, 256, size=(48, 64, 3)).astype(np.uint8)
+
+    def render(exposure: Exposure, seen: object) -> NDArray[Any]:
+        assert exposure.pixel_format == pixel_format
+        return sent
+
+    scene.render = render  # type: ignore[method-assign]  # another picture
+    with served(remote, scene, formats=(pixel_format,)):
+        remote.ask("open", replace(SETTINGS, pixel_format=pixel_format, bit_depth=8))
+        for frame in remote.grab(6):
+            assert np.array_equal(frame.colour, sent)
+            lost = (sent > 0.97 * 255).any(axis=-1)
+            assert lost.any()
+            assert np.all(frame.image[lost] == 255)
+            assert np.array_equal(frame.image[~lost], sent[~lost][:, 1])
+
+
 def test_each_image_owns_its_memory(remote: RemoteCamera, scene: LevelScene) -> None:
     """More frames than buffers, each still showing its own sequence number."""
     with served(remote, scene):

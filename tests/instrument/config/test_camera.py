@@ -150,7 +150,12 @@ def test_albedos_of_channels_that_make_no_sample_are_refused(
     assert any(message in p for p in found), found
 
 
-def test_no_pixel_format_of_one_count_has_three_channels() -> None:
-    rig = changed(RIG, "camera:\n  driver: simulated", YUYV)
-    rig = changed(rig, "bit_depth: 12", "bit_depth: 8\n  channels: 3")
-    assert any("camera.channels: 3; allowed for YUYV: 1" in p for p in problems(rig=rig))
+@pytest.mark.parametrize(("pixel_format", "given", "allowed"), [("YUYV", 3, 1), ("BGR3", 1, 3)])
+def test_the_channels_are_those_of_the_pixel_format(
+    pixel_format: str, given: int, allowed: int
+) -> None:
+    full = YUYV.replace("YUYV", pixel_format).replace("limited", "full")
+    rig = changed(RIG, "camera:\n  driver: simulated", full)
+    rig = changed(rig, "bit_depth: 12", f"bit_depth: 8\n  channels: {given}")
+    text = f"camera.channels: {given}; allowed for {pixel_format}: {allowed}"
+    assert any(text in p for p in problems(rig=rig))
