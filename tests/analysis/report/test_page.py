@@ -21,6 +21,7 @@ from analysis.report.style import CSS, HOVER, format_value, visible
 from instrument.errors import StorageError
 from instrument.geometry import FloatArray
 from instrument.record.reading import Preview
+from tests.support.analysis.no_charts import leave_charts_out
 from tests.support.analysis.report_data import NAN, data_of, png, svgs, without_tile, words
 
 pytestmark = pytest.mark.charts
@@ -155,7 +156,10 @@ def test_hostile_texts_are_escaped() -> None:
 
 
 class TestFile:
-    def test_is_written_completely_without_leftovers(self, tmp_path: Path) -> None:
+    def test_is_written_completely_without_leftovers(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        leave_charts_out(monkeypatch)
         path = tmp_path / "report.html"
         path.write_text("old")
         write_report(path, data_of(sample="caf\udce9"))  # a file name that was not UTF-8
@@ -171,6 +175,7 @@ class TestFile:
         def full(*_: object, **__: object) -> None:
             raise OSError(errno.ENOSPC, "no space left on device")
 
+        leave_charts_out(monkeypatch)
         monkeypatch.setattr(os, "replace", full)
         with pytest.raises(StorageError, match=r"report\.html: the disk is full"):
             write_report(path, without_tile())
@@ -216,9 +221,12 @@ class TestBrokenNumbers:
         page = report_html(replace(whole, **columns))
         assert "No geometry has a value to plot." in page
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("seed", range(4))
-    def test_numbers_over_600_decades(self, seed: int) -> None:
+    def test_numbers_over_600_decades(self, seed: int, slow: bool) -> None:
         """Values, u, parameters and criteria from 1e-300 to 1e300, of either sign, and zeros."""
+        if seed > 1 and not slow:
+            pytest.skip("with --slow")
         rng = np.random.default_rng(seed)
 
         def wide(n: int) -> FloatArray:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.analysis.no_charts import leave_charts_out
 from tests.support.analysis.report_data import words
 from tests.support.command import gonio_here as gonio
 
@@ -53,7 +54,8 @@ def test_a_table_gets_the_report_of_a_run(tmp_path: Path) -> None:
         assert absent not in page
 
 
-def test_what_is_printed_is_in_the_report(tmp_path: Path) -> None:
+def test_what_is_printed_is_in_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    leave_charts_out(monkeypatch)
     table, folder = lambertian(tmp_path), tmp_path / "fit"
     done = gonio("fit", table, "--models", "lambert", "--out", folder, "--json")
     assert json.loads(done.stdout) == json.loads((folder / "fit.json").read_text())
@@ -63,8 +65,11 @@ def test_what_is_printed_is_in_the_report(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("options", [(), ("--u-shared", "1%"), ("--relative",)])
 @pytest.mark.parametrize("u", [True, False])
-def test_its_table_gives_the_same_fit(tmp_path: Path, u: bool, options: tuple[str, ...]) -> None:
+def test_its_table_gives_the_same_fit(
+    tmp_path: Path, u: bool, options: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Values with an error that all share, too; relative ones keep their form, not their level."""
+    leave_charts_out(monkeypatch)
     table, folder = lambertian(tmp_path, u=u), tmp_path / "fit"
     models = ("--models", "lambert,minnaert", "--json")
     first = gonio("fit", table, *models, *options, "--out", folder)

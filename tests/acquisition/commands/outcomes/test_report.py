@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.commands.outcomes.pdf import BROWSERS
+from tests.support.analysis.no_charts import leave_charts_out
 from tests.support.command import finished_run
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import TWO_MODELS, small_demo
@@ -45,6 +46,7 @@ def test_a_browser_that_fails_is_named(run: Path, tmp_path: Path) -> None:
     stand_in.write_text("#!/bin/sh\necho broken >&2\n")
     stand_in.chmod(0o755)
     with pytest.MonkeyPatch.context() as patched:
+        leave_charts_out(patched)
         patched.setenv("PATH", str(tmp_path), prepend=":")
         done = gonio("report", run, "--pdf")
     assert done.returncode == 3
