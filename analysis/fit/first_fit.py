@@ -41,6 +41,10 @@ _CLOSE = 0.02
 _RISE = 1e-3
 # Of a rough fit: relative tolerance of chi2, and the most steps.
 _ROUGH_RTOL, _ROUGH_STEPS = 1e-2, 4
+LEFT = (
+    f"left after {_ROUGH_STEPS} steps of the search, as it is far behind on {_PART} of the points"
+)
+"""Message of a rough fit."""
 # Iterations in which a robust fit and its estimate of the noise converge.
 _ROBUST_ROUNDS = 3
 # Standard deviation of normal errors over the median of their absolute values.
@@ -100,6 +104,7 @@ class FirstFits:
         (start, *_) = _lowest(problem, self.part.of(model))
         found = problem.solve(start, rtol=_ROUGH_RTOL, most_steps=_ROUGH_STEPS)
         own = bic(self.measurements, problem, found)
+        found = found._replace(converged=False, message=LEFT)
         return FirstFit(model, problem, found, own, (found.x,), rough=True)
 
     def _fit(self, model: Model) -> FirstFit:

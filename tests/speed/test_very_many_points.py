@@ -88,6 +88,8 @@ def test_the_choice_is_that_of_a_search_with_all_points(
     for name, u in whole.best.u.items():
         if u is not None:
             assert abs(quick.best.values[name] - whole.best.values[name]) < 0.1 * u, name
+    assert all(c.converged or c.message == first_fit.LEFT for c in quick.candidates)
+    assert any(c.message == first_fit.LEFT for c in quick.candidates)
     shown = {c.model: c.chi2 or 0.0 for c in quick.candidates}
     least = min(c.chi2 or 0.0 for c in whole.candidates)
     for one in whole.candidates:
