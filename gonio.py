@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from acquisition.facility.devices.rig_devices import open_rig
 from acquisition.facility.plans import gonio_scan
+from acquisition.facility.tiled_server import fetch_table
 from acquisition.notebook.fits import Fit, fit
 from acquisition.notebook.runs import Run, load
 from acquisition.notebook.scans import PlannedScan, plan, run
@@ -43,6 +44,7 @@ __all__ = [
     "Run",
     "StorageError",
     "Table",
+    "fetch_table",
     "fit",
     "gonio_scan",
     "load",

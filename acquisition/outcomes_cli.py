@@ -14,7 +14,7 @@ def _format_names(incomplete: str) -> list[str]:
     """Completion in the shell of formats of files."""
     from analysis.exchange.formats import FORMATS
 
-    return [name for name in FORMATS if name.startswith(incomplete)]
+    return [name for name in (*FORMATS, "documents", "tiled") if name.startswith(incomplete)]
 
 
 def export(
@@ -24,20 +24,26 @@ def export(
         typer.Option(
             "--format",
             help="Format of the file: csv, astm, zemax, pab, alta, nexus, merl, mitsuba, "
-            "radiance, openmaterial.",
+            "radiance, openmaterial; documents of bluesky (.jsonl), or a tiled server.",
             autocompletion=_format_names,
         ),
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="File to write.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write; not for tiled.")
+    ] = None,
+    to: Annotated[
+        str | None,
+        typer.Option(help="Address of a Tiled server, for tiled; its key may be in TILED_API_KEY."),
+    ] = None,
 ) -> None:
     """Write a run in the format of another program; points with a flag are left out.
 
     What is interpolated or modelled is marked as such. No file is written where the format cannot
     hold the run.
     """
-    from acquisition.commands.outcomes.export import export_run
+    from acquisition.commands.outcomes.export import export_to
 
-    export_run(folder, format, output)
+    export_to(folder, format, output, to)
 
 
 def compare(

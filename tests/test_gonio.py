@@ -10,7 +10,8 @@ import pytest
 import gonio
 from tests.support.paths import ROOT
 
-FUNCTIONS = ("load", "read_table", "read_curet", "fit", "plan", "run", "open_rig", "gonio_scan")
+FUNCTIONS = ("load", "read_table", "read_curet", "fit", "plan", "run", "open_rig", "gonio_scan",
+             "fetch_table")  # fmt: skip
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 
 from instrument.config.load import Loaded
 
+READINGS, TABLE = "readings", "measurements"
+"""Streams of events: readings as in the record, and the rows of measurements.csv."""
 KEYS = (
     "protocol", "rig", "protocol_sha256", "rig_sha256", "program_version", "versions",
     "started_utc", "white_tile", "camera_calibration", "geometry_calibration",

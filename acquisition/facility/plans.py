@@ -7,16 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.facility.devices.rig_devices import require_drivable
-from acquisition.facility.metadata import start_metadata
+from acquisition.facility.metadata import READINGS, TABLE, start_metadata
 from acquisition.facility.scan_device import ScanDevice
 from acquisition.plan.plan import Plan, make_plan
 from acquisition.results.model_check import check_model
 from acquisition.results.run_folder import default_folder, run_meta
 from instrument.config.load import Loaded, load_protocol
 from instrument.errors import InputError
-
-READINGS, TABLE = "readings", "measurements"
-"""Streams of events: readings as in the record, and the rows of measurements.csv."""
 
 Messages = Generator[Any, Any, Any]
 

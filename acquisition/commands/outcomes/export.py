@@ -8,6 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from acquisition.facility.exporting import (
+    DOCUMENTS,
+    TILED,
+    export_documents,
+    export_to_tiled,
+)
 from acquisition.results.fitting import Fitted, fit_run
 from acquisition.results.measurements_csv import measurements_csv
 from acquisition.results.reduction import Reduced, reduced_run, require_usable
@@ -22,6 +28,25 @@ from instrument.geometry import BoolArray, Geometry
 from instrument.record.record import Record
 from instrument.text.atomic_file import write_whole
 from instrument.text.quoting import printable
+
+
+def export_to(run: Path, name: str, path: Path | None, url: str | None) -> None:
+    """Write a run in the format `name` to a file, or to a server at `url`; print where it is.
+
+    Raises `InputError` without the one that the format needs, or with the other.
+    """
+    if (url is not None) != (name == TILED):
+        wanted = "missing" if name == TILED else f"for the format {printable(name)}"
+        raise InputError(f"--to: {wanted}; a Tiled server's address belongs to --format {TILED}")
+    if (path is not None) == (name == TILED):
+        wanted = f"for the format {TILED}, which writes no file" if path else "missing: name a file"
+        raise InputError(f"--output: {wanted}")
+    if url is not None:
+        export_to_tiled(run, url)
+    elif path is not None and name == DOCUMENTS:
+        export_documents(run, path)
+    elif path is not None:
+        export_run(run, name, path)
 
 
 def export_run(run: Path, name: str, path: Path) -> None:
@@ -62,9 +87,10 @@ def _write(files: Mapping[Path, bytes]) -> None:
 def _format(name: str, path: Path) -> Format:
     """Return the format of this name, for a file whose name fits it."""
     if name not in FORMATS:
-        near = difflib.get_close_matches(name.lower(), FORMATS, n=1)
+        allowed = (*FORMATS, DOCUMENTS, TILED)
+        near = difflib.get_close_matches(name.lower(), allowed, n=1)
         hint = f"; did you mean {near[0]}?" if near else ""
-        raise InputError(f"--format: {printable(name)}; allowed: {', '.join(FORMATS)}{hint}")
+        raise InputError(f"--format: {printable(name)}; allowed: {', '.join(allowed)}{hint}")
     wanted = FORMATS[name]
     if path.suffix.lower() != wanted.suffix:
         raise InputError(f"{path}: --output must end in {wanted.suffix} for the format {name}")

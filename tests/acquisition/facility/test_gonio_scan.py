@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from acquisition.commands.scan import scan_into
-from acquisition.facility.plans import READINGS, TABLE, gonio_scan
+from acquisition.facility.metadata import READINGS, TABLE
+from acquisition.facility.plans import gonio_scan
 from acquisition.facility.table_columns import columns_of, table_of
 from acquisition.results.finish import finish
 from acquisition.results.run_folder import load_run_inputs
