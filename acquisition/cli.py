@@ -9,14 +9,23 @@ import gc
 import os
 import platform
 import sys
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from acquisition.calibrate_cli import calibrate
-from acquisition.cli_parts import Commands, Json, ProtocolFile, RigFile, RigOnly, RunFolder
+from acquisition.cli_parts import (
+    Commands,
+    Json,
+    ProtocolFile,
+    RigFile,
+    RigOnly,
+    RunFolder,
+    among,
+    model_names,
+)
+from acquisition.fit_cli import fit
 from acquisition.gallery_cli import gallery
 from acquisition.new_cli import new
 from acquisition.outcomes_cli import compare, export, map_, runs, show
@@ -42,18 +51,6 @@ app.add_typer(new, name="new")
 _AXES = ("theta_i", "dphi", "theta_r")
 
 
-def _among(words: Sequence[str]) -> Callable[[str], list[str]]:
-    """Completion in the shell among a few words."""
-    return lambda incomplete: [word for word in words if word.startswith(incomplete)]
-
-
-def _model_names(incomplete: str) -> list[str]:
-    """Completion in the shell of names of models, separated by commas."""
-    from acquisition.commands.models import completed_names
-
-    return completed_names(incomplete)
-
-
 OutFolder = Annotated[
     Path | None,
     typer.Option(
@@ -66,7 +63,7 @@ Live = Annotated[
 ]
 AxisName = Annotated[
     str,
-    typer.Argument(help="theta_i, dphi or theta_r.", autocompletion=_among(_AXES)),
+    typer.Argument(help="theta_i, dphi or theta_r.", autocompletion=among(_AXES)),
 ]
 
 
@@ -129,93 +126,7 @@ def resume(folder: RunFolder, yes: Yes = False, live: Live = False, json: Json =
     resume_run(folder, yes=yes, live=live, as_json=json)
 
 
-@app.command()
-def fit(
-    source: Annotated[Path, typer.Argument(help="A run's folder, or a CSV table.")],
-    models: Annotated[
-        str | None,
-        typer.Option(
-            help="Candidate models, separated by commas. Default: those of a run's protocol, else "
-            "the whole ladder.",
-            autocompletion=_model_names,
-        ),
-    ] = None,
-    max_theta_deg: Annotated[
-        float, typer.Option(help="Leave out points with a larger theta_i or theta_r (degrees).")
-    ] = 90.0,
-    format: Annotated[
-        str,
-        typer.Option(
-            help="run, csv, astm, zemax, pab, alta, merl or curet; auto: by content.",
-            autocompletion=_among(
-                ("auto", "run", "csv", "astm", "zemax", "pab", "alta", "merl", "curet")
-            ),
-        ),
-    ] = "auto",
-    sample: Annotated[int | None, typer.Option(help="Number of the material, for curet.")] = None,
-    robust: Annotated[
-        bool, typer.Option("--robust", help="Give outliers less weight, and list them.")
-    ] = False,
-    relative: Annotated[
-        bool,
-        typer.Option("--relative", help="The values are relative: no reference fixes their scale."),
-    ] = False,
-    u_shared: Annotated[
-        str | None,
-        typer.Option(
-            help="Relative u of an error that all values share (0.5% or 0.005), for tables."
-        ),
-    ] = None,
-    repeats: Annotated[
-        str | None,
-        typer.Option(
-            help="mean: average rows of the same geometry, weighted by 1/u². Default: refuse them."
-        ),
-    ] = None,
-    cosine_corrected: Annotated[
-        bool,
-        typer.Option("--cosine-corrected", help="A table's values are BRDF times cos(theta_r)."),
-    ] = False,
-    mirror_azimuth: Annotated[
-        bool,
-        typer.Option("--mirror-azimuth", help="A table's azimuth 0 is the mirror side."),
-    ] = False,
-    method: Annotated[
-        str,
-        typer.Option(
-            help="Method for rough surfaces: auto, qualitative, functional or exact.",
-            autocompletion=_among(("auto", "qualitative", "functional", "exact")),
-        ),
-    ] = "auto",
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", help="New folder for report.html, fit.json, measurements.csv."),
-    ] = None,
-    json: Json = False,
-) -> None:
-    """Find the simplest model that explains a run or a table of BRDF.
-
-    A CSV table has the columns theta_i_deg, theta_r_deg, dphi_deg, brdf and, if known, u_brdf.
-    Tables in the text formats of `gonio export` are read too.
-    Exits with 0 whether or not a model is adequate, with 5 if the data do not determine the
-    parameters.
-    """
-    from acquisition.commands.fit import fit_source, parse_u_shared
-    from acquisition.results.sources import Wanted
-
-    wanted = Wanted(
-        format=format,
-        sample=sample,
-        max_theta_deg=max_theta_deg,
-        relative=relative,
-        u_shared=parse_u_shared(u_shared),
-        repeats=repeats,
-        cosine_corrected=cosine_corrected,
-        mirror_azimuth=mirror_azimuth,
-    )
-    fit_source(
-        source, wanted, models=models, robust=robust, method=method, folder=out, as_json=json
-    )
+app.command()(fit)
 
 
 @app.command()
@@ -223,7 +134,7 @@ def models(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Models or sums of them. Default: all single ones.", autocompletion=_model_names
+            help="Models or sums of them. Default: all single ones.", autocompletion=model_names
         ),
     ] = None,
     json: Json = False,

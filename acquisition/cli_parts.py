@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -32,6 +32,18 @@ RigFile = Annotated[
 RunFolder = Annotated[Path, typer.Argument(help="The folder of a run.")]
 
 RigOnly = Annotated[Path | None, typer.Option("--rig", help="The rig file.")]
+
+
+def among(words: Sequence[str]) -> Callable[[str], list[str]]:
+    """Completion in the shell among a few words."""
+    return lambda incomplete: [word for word in words if word.startswith(incomplete)]
+
+
+def model_names(incomplete: str) -> list[str]:
+    """Completion in the shell of names of models, separated by commas."""
+    from acquisition.commands.models import completed_names
+
+    return completed_names(incomplete)
 
 
 class Commands(TyperGroup):

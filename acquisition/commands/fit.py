@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from acquisition.commands.fit_status import no_fit_reported, print_json, require_result
@@ -12,7 +13,7 @@ from acquisition.commands.outcomes.new_folder import require_new_folder, write_f
 from acquisition.commands.outcomes.relative_u import parse_relative_u
 from acquisition.commands.views import parameter_lines
 from acquisition.results.model_check import check_model
-from acquisition.results.sources import Source, Wanted, read_source
+from acquisition.results.sources import Source, Wanted, read_source, require_wanted
 from acquisition.results.summary import paper_ratio_note, parameters_of, verdict_sentence
 from acquisition.terminal.console import console, out, print_lines, print_notes, print_text
 from acquisition.terminal.layout import table_lines, wrapped
@@ -27,48 +28,91 @@ from instrument.errors import InputError, NotDetermined
 
 _MOST_ROWS = 12  # of the table of candidates
 
+SignOfLife = Callable[[str], AbstractContextManager[None]]
 
-def fit_source(
-    path: Path,
-    wanted: Wanted,
-    *,
-    models: str | None,
-    robust: bool,
-    method: str,
-    folder: Path | None = None,
-    as_json: bool,
-) -> None:
-    """Fit the `wanted` part of a source and print the outcome.
 
-    `models`: names separated by commas; None for those of a run's protocol, else the ladder.
-    `method`: for rough surfaces, one of `analysis.choice.ladder.METHODS`; auto: that of a run's
-    protocol. `folder`: a new one for report.html and fit.json, also where no model could be fitted.
-    Raises `InputError` for a wrong source or option; after printing, as `fit_status.require_result`
-    does.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """Request for a fit, as the options of the command have it.
+
+    wanted: part of the source. models: names separated by commas; None for those of a run's
+    protocol, else the ladder. method: for rough surfaces, one of `analysis.choice.ladder.METHODS`;
+    auto: that of a run's protocol.
     """
-    names, way = _names(models), _method(method, models)
+
+    wanted: Wanted
+    models: str | None = None
+    robust: bool = False
+    method: str = "auto"
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """Fit of a source, with the content of fit.json; without a choice, `error` says why."""
+
+    source: Source
+    choice: Choice | None
+    json: Mapping[str, object]
+    error: NotDetermined | None = None
+
+
+def require_options(asked: Asked) -> None:
+    """Raise `InputError` for an option that is wrong for every source."""
+    require_wanted(asked.wanted)
+    _names(asked.models)
+    _method(asked.method, asked.models)
+
+
+def fit_source(path: Path, asked: Asked, *, folder: Path | None = None, as_json: bool) -> None:
+    """Fit what is asked for of a source and print the outcome.
+
+    `folder`: a new one for report.html and fit.json, also where no model could be fitted. Raises
+    `InputError` for a wrong source or option; after printing, as `fit_status.require_result` does.
+    """
+    require_options(asked)
     if folder is not None:
         require_new_folder(folder, "--out")
     with no_fit_reported(path, as_json):
-        with sign_of_life(f"reading {path.name}"):
-            source = read_source(path, wanted)
-        if names is None and way == "auto":
-            names, way = source.fit.models, source.fit.method
-        names = _seen(names, source)
-        try:
-            choice = _choice(source, names, robust, way)
-        except NotDetermined as error:
+        fitted = fit_of(path, asked, sign_of_life)
+        if fitted.error is not None:
             if folder is not None:
-                _write(folder, path, source, None, no_fit_json(error))
-            raise
-    found = to_json(replace(choice, notes=(*source.notes, *choice.notes)))
+                _write(folder, path, fitted)
+            raise fitted.error
     if as_json:
-        print_json(found)
-    else:
-        _print(source, choice)
+        print_json(fitted.json)
+    elif fitted.choice is not None:
+        _print(fitted.source, fitted.choice)
     if folder is not None:
-        _write(folder, path, source, choice, found)
-    require_result(found, str(path))
+        _write(folder, path, fitted)
+    require_result(fitted.json, str(path))
+
+
+def fit_of(path: Path, asked: Asked, sign: SignOfLife) -> Fitted:
+    """Read a source and choose its model; `sign` shows that either is under way.
+
+    Raises `InputError` for a wrong source or option, and as `read_source` does where there is
+    nothing to fit.
+    """
+    names, way = _names(asked.models), _method(asked.method, asked.models)
+    with sign(f"reading {path.name}"):
+        source = read_source(path, asked.wanted)
+    if names is None and way == "auto":
+        names, way = source.fit.models, source.fit.method
+    names = _seen(names, source)
+    try:
+        with sign(f"fit of {source.measurements.size} points"):
+            choice = _choice(source, names, asked.robust, way)
+    except NotDetermined as error:
+        return Fitted(source, None, no_fit_json(error), error)
+    return Fitted(source, choice, to_json(replace(choice, notes=(*source.notes, *choice.notes))))
+
+
+def report_files(path: Path, fitted: Fitted) -> dict[str, str]:
+    """Content of report.html, fit.json and measurements.csv, by name."""
+    from acquisition.commands.outcomes.fit_report import fit_files  # heavy: the charts' library
+
+    source, choice = fitted.source, fitted.choice
+    return fit_files(path, source, choice, fitted.json, _remarks(source, choice))
 
 
 def _seen(names: Sequence[str] | None, source: Source) -> list[str] | None:
@@ -90,26 +134,20 @@ def _seen(names: Sequence[str] | None, source: Source) -> list[str] | None:
 def _choice(
     source: Source, names: Sequence[str] | None, robust: bool, method: MethodOfFit
 ) -> Choice:
-    with sign_of_life(f"fit of {source.measurements.size} points"):
-        return choose(
-            source.measurements,
-            source.acceptance,
-            names,
-            robust,
-            method,
-            certificate_leads=source.fit.certificate_leads,
-        )
+    return choose(
+        source.measurements,
+        source.acceptance,
+        names,
+        robust,
+        method,
+        certificate_leads=source.fit.certificate_leads,
+    )
 
 
-def _write(
-    folder: Path, path: Path, source: Source, choice: Choice | None, fit: Mapping[str, object]
-) -> None:
+def _write(folder: Path, path: Path, fitted: Fitted) -> None:
     """Write the files of the fit, and say where the report is."""
-    from acquisition.commands.outcomes.fit_report import fit_files  # heavy: the charts' library
-
-    remarks = _remarks(source, choice)
     with sign_of_life("report"):
-        write_files(folder, fit_files(path, source, choice, fit, remarks))
+        write_files(folder, report_files(path, fitted))
     console.print(f"report: {folder / 'report.html'}", highlight=False, soft_wrap=True)
 
 

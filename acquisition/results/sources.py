@@ -83,7 +83,7 @@ def read_source(path: Path, wanted: Wanted) -> Source:
     Raises `InputError` for wrong input, `NoMeasurement` if no point is left, `AllFlagged` if those
     of a run are all flagged, `NotDetermined` if its values are outside their domain.
     """
-    _check(wanted)
+    require_wanted(wanted)
     kind = _kind(path) if wanted.format == "auto" else wanted.format
     if (wanted.sample is not None) != (kind == "curet"):
         raise InputError(
@@ -110,7 +110,8 @@ def read_source(path: Path, wanted: Wanted) -> Source:
     return source
 
 
-def _check(wanted: Wanted) -> None:
+def require_wanted(wanted: Wanted) -> None:
+    """Raise `InputError` for a selection that is wrong for every source."""
     if wanted.repeats not in (None, "mean"):
         raise InputError(f"--repeats: {printable(wanted.repeats or '')}; allowed: mean")
     if wanted.format not in FORMATS:

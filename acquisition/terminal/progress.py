@@ -13,6 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from acquisition.plan.plan import Plan, Step
 from acquisition.plan.step_count import StepCount
 from acquisition.terminal.console import console, duration_text
+from instrument.text.terminal_safe import escape_control_characters
 
 QUIET_S = 2.0  # what is done sooner needs no sign of life
 _WIDE = 60  # characters that hold a bar beside the numbers of a scan
@@ -115,3 +116,32 @@ def _log_running(task: str, begun_s: float, done: threading.Event) -> None:
         if done.wait(pause_s):
             return
         pause_s *= 2
+
+
+OnDone = Callable[[str, bool], None]
+
+
+@contextmanager
+def counted_progress(total: int, done: str) -> Iterator[OnDone]:
+    """Show how many of `total` items are done; yield the function to call after each.
+
+    It takes the line about the item and whether it failed. In a terminal a counter runs, named
+    `done`, such as "fitted"; in a log each item has its line.
+    """
+    if not console.is_interactive:
+        numbers = iter(range(1, total + 1))
+        yield lambda line, _: _print(escape_control_characters(f"{next(numbers)}/{total} {line}"))
+        return
+    count, left = TextColumn("{task.description}"), TimeRemainingColumn(compact=True)
+    columns = (count, BarColumn(), left) if console.width >= _WIDE else (count,)
+    with Progress(*columns, console=console) as bar:
+        failures = [0]
+        task = bar.add_task(f"0 of {total} {done}", total=total)
+
+        def on_done(_: str, failed: bool) -> None:
+            failures[0] += failed
+            bar.advance(task)
+            text = f"{bar.tasks[0].completed:.0f} of {total} {done}"
+            bar.update(task, description=text + f", {failures[0]} failed" * bool(failures[0]))
+
+        yield on_done

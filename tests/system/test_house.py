@@ -53,6 +53,14 @@ def test_scan_and_fit_import_no_library_that_most_runs_do_not_need() -> None:
     assert not heavy & _loaded_by(f"{needed}, {driven}")
 
 
+def test_neither_scan_nor_fits_import_the_cluster() -> None:
+    """Dask is for `gonio fit --all --scheduler`, and imported once that is called."""
+    needed = (
+        "acquisition.commands.scan, acquisition.commands.fit, acquisition.commands.many.fit_all"
+    )
+    assert not {"dask", "distributed", "tornado"} & _loaded_by(needed)
+
+
 def test_a_waiting_test_carries_its_mark_in_its_own_file() -> None:
     """`make test` looks for the mark in the text of tests/**/test_*.py, and runs those files."""
     mark = "pytest.mark." + "waits"

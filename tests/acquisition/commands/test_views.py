@@ -71,7 +71,7 @@ def test_a_fit_is_printed_whole_at_any_width(
 
     def show() -> None:
         with suppress(NotDetermined):
-            fit.fit_source(path, Wanted(), models=None, robust=False, method="auto", as_json=False)
+            fit.fit_source(path, fit.Asked(wanted=Wanted()), as_json=False)
 
     _assert_whole_at_any_width(show, monkeypatch)
 

@@ -11,7 +11,7 @@ import pytest
 from acquisition.plan.plan import make_plan
 from acquisition.terminal import progress
 from acquisition.terminal.console import console, duration_text
-from acquisition.terminal.progress import scan_progress, sign_of_life
+from acquisition.terminal.progress import counted_progress, scan_progress, sign_of_life
 from instrument.config.load import Loaded
 from tests.support.stages.waiting import wait_until
 
@@ -108,3 +108,28 @@ def test_a_task_that_is_quick_gives_none(capsys: pytest.CaptureFixture[str]) -> 
             pass
     assert capsys.readouterr().err == ""
     assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("width", range(30, 121, 10))
+def test_a_counter_of_what_is_done_and_failed_runs_in_a_terminal(
+    width: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(console, "_width", width)
+    in_terminal(monkeypatch, True)
+    with console.capture() as shown, counted_progress(300, "fitted") as on_done:
+        for n in range(200):
+            on_done(f"{n}.csv: lambert, adequate", n % 50 == 0)
+    last = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.get()).split("\n")[-2]
+    assert "200 of 300 fitted, 4 failed" in last
+
+
+def test_a_log_has_one_line_for_each_item_without_control_characters(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with counted_progress(2, "fitted") as on_done:
+        on_done("a\x1b[2J.csv: lambert, adequate", False)
+        on_done("b.csv: missing column", True)
+    first, second = capsys.readouterr().err.splitlines()
+    assert first.startswith("1/2 a")
+    assert "\x1b" not in first
+    assert second == "2/2 b.csv: missing column"

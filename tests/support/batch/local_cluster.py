@@ -1,0 +1,44 @@
+"""Dask cluster of two worker processes, in a process of its own: its loop belongs to no test.
+
+`python -m tests.support.batch.local_cluster` prints the scheduler's address and runs until its
+standard input ends.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from tests.support.paths import ROOT
+
+
+@contextmanager
+def local_cluster() -> Iterator[str]:
+    """Run a cluster and yield the address of its scheduler."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "tests.support.batch.local_cluster"],
+        cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        text=True,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        address = process.stdout.readline().strip()
+        assert address.startswith("tcp://"), address
+        yield address
+
+
+def main() -> None:
+    """Run the cluster."""
+    from distributed import LocalCluster
+
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        sys.stdout.write(f"{cluster.scheduler_address}\n")
+        sys.stdout.flush()
+        sys.stdin.read()
+
+
+if __name__ == "__main__":
+    main()
