@@ -20,7 +20,7 @@ from drivers.manual import HandCoveredLamp, HandSetAxis
 from instrument.board import Board
 from instrument.clock import Clock, SystemClock
 from instrument.closeable import Closeable
-from instrument.config.axes import AXES, HandAxis, SimulatedAxis, Wired
+from instrument.config.axes import AXES, HandAxis, OphydAxis, SimulatedAxis, Wired
 from instrument.config.camera import V4l2CameraConfig
 from instrument.config.load import Loaded
 from instrument.config.rig import Rig
@@ -200,6 +200,10 @@ class OpenRig(Closeable):
             scene = self._simulated()
             stage = SimulatedStage(name, settings, scene, self.clock)
             return self._faults.stage(name, stage, settings, scene) if self._faults else stage
+        if isinstance(settings, OphydAxis):
+            from drivers.factory import open_ophyd
+
+            return open_ophyd(name, settings, self.clock)
         return self._motor_stage(name, settings)
 
     def _motor_stage(self, name: str, settings: Wired) -> Stage:

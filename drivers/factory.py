@@ -16,7 +16,7 @@ from drivers.stages.motion import Limits
 from drivers.stages.motor_stage import MotorStage
 from instrument.clock import Clock
 from instrument.closeable import Closeable
-from instrument.config.axes import NewportAxis, OrientalAxis, Wired, ZaberAxis
+from instrument.config.axes import NewportAxis, OphydAxis, OrientalAxis, Wired, ZaberAxis
 from instrument.config.camera import V4l2CameraConfig
 from instrument.devices import Camera
 
@@ -109,7 +109,14 @@ def _oriental(name: str, axis: OrientalAxis, port: str, lines: Lines) -> MotorSt
     return OrientalStage(name, bus, axis.unit, axis.steps_per_deg, _limits(axis), lines.clock)
 
 
-def _limits(axis: Wired) -> Limits:
+def open_ophyd(name: str, axis: OphydAxis, clock: Clock) -> MotorStage:
+    """Connect the motor of another control system; raise `DeviceError` if it is not there."""
+    from drivers.ophyd.stage import OphydStage
+
+    return OphydStage(name, axis.motor, axis.prefix, _limits(axis), clock)
+
+
+def _limits(axis: Wired | OphydAxis) -> Limits:
     low, high = axis.device_limits_deg()
     return Limits(
         min_deg=low,

@@ -162,10 +162,31 @@ class OrientalAxis(_WiredAxis):
     parity: Literal["E", "N", "O"] = "E"
 
 
+class OphydAxis(_MotorAxis):
+    """Motor of another control system, as EPICS, by its class in ophyd-async: `module:Class`.
+
+    `prefix`: of its address there, for a class that takes one. It counts in degrees and knows its
+    reference.
+    """
+
+    reports_while_moving: ClassVar[bool] = False  # with which delay is not known
+
+    driver: Literal["ophyd"]
+    motor: Annotated[
+        str,
+        Field(
+            max_length=200,
+            pattern=r"^[A-Za-z_][A-Za-z0-9_.]*:[A-Za-z_][A-Za-z0-9_]*$",
+            description="module:Class, such as ophyd_async.epics.motor:Motor",
+        ),
+    ]
+    prefix: Annotated[str, Field(min_length=1, max_length=200)] | None = None
+
+
 Wired = NewportAxis | ZaberAxis | OrientalAxis
-MotorAxis = SimulatedAxis | Wired
+MotorAxis = SimulatedAxis | OphydAxis | Wired
 Axis = Annotated[
-    HandAxis | SimulatedAxis | NewportAxis | ZaberAxis | OrientalAxis,
+    HandAxis | SimulatedAxis | NewportAxis | ZaberAxis | OrientalAxis | OphydAxis,
     Field(discriminator="driver"),
 ]
 

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, PrivateAttr
 
 from instrument.calibration.geometry_file import GeometryCalibration
-from instrument.config.axes import AXES, EMULATED, Axes, HandAxis, SimulatedAxis, Wired
+from instrument.config.axes import AXES, EMULATED, Axes, HandAxis, OphydAxis, SimulatedAxis, Wired
 from instrument.config.camera import AnyCamera, CameraDefects, SimulatedCameraConfig
 from instrument.config.section import Finite, Name, NotNegative, Positive, Section
 from instrument.config.simulated.defects import (
@@ -227,6 +227,8 @@ class Rig(Section):
             axis = self.axes[name]
             if isinstance(axis, SimulatedAxis):
                 yield f"axis {name}", "simulated"
+            elif isinstance(axis, OphydAxis):
+                yield f"axis {name}", "real"
             elif not isinstance(axis, HandAxis):
                 yield f"axis {name}", "emulated" if axis.port == EMULATED else "real"
         if isinstance(self.camera, SimulatedCameraConfig):

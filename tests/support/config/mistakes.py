@@ -323,7 +323,7 @@ CHECK_MISTAKES = {
     ),
 }
 
-DRIVERS = "hand or newport or oriental or simulated or zaber"
+DRIVERS = "hand or newport or ophyd or oriental or simulated or zaber"
 
 RIG_MISTAKES = {
     "driver missing": (
