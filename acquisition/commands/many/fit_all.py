@@ -97,7 +97,7 @@ def _fit_each(found: Found, asked: Asked, many: Many, outcomes: list[Outcome]) -
         for (name, _), result in results:
             outcome = _outcome(name, result)
             if many.out is not None and outcome.files:
-                _keep(many.out, outcome)
+                keep_files(many.out, outcome)
             outcomes.append(outcome)
             shown(_line(outcome), bool(outcome.exit_code))
 
@@ -133,7 +133,7 @@ def _line(outcome: Outcome) -> str:
     return f"{outcome.source}: {fit.get('chosen')}, {fit.get('verdict')}"
 
 
-def _keep(folder: Path, outcome: Outcome) -> None:
+def keep_files(folder: Path, outcome: Outcome) -> None:
     """Write the files of a fit into a folder of its own, which is there whole or not at all."""
     final, part = folder / _FITS / outcome.source, folder / ".part"
     try:

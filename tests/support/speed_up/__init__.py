@@ -1,0 +1,1 @@
+"""Speed-up of many fits by more processes, and what limits it: open `speed_up`."""
