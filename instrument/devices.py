@@ -48,6 +48,16 @@ class Frame:
     sequence: int | None = None
     colour: Image | None = None
 
+    def brightest(self, crop: tuple[slice, slice]) -> Image:
+        """Return the counts (rows, columns) of a crop by which an exposure is judged.
+
+        Those of the brightest channel of each pixel.
+        """
+        if self.colour is None:
+            return self.image[crop]
+        counts: Image = self.colour[crop].max(axis=-1)
+        return counts
+
 
 def mono_picture(colour: Image, max_dn: int) -> Image:
     """Return the picture (rows, columns) that stands for a colour one (rows, columns, 3), in DN.

@@ -126,10 +126,10 @@ def measure(
     dark_mean, dark_variance = dark.mean[window.crop], dark.variance[window.crop]
     black = photon_transfer(dark_mean, camera) * (1 / len(frames) + 1 / dark.frames)
     window, dead_share = without_dead_pixels(window, mean - dark_mean, black)
-    counted = [crop[window.counted] for crop in crops]
+    counted = frames[0].brightest(window.crop)[window.counted]
     saturated = [(crop >= camera.max_dn) & window.counted for crop in crops]
     saturated_weight = float(np.mean([window.weights[pixels].sum() for pixels in saturated]))
-    peak = bright_level(counted[0]) if counted[0].size else float("nan")
+    peak = bright_level(counted) if counted.size else float("nan")
     rounding, u_rounding = dark_rounding_dn(dark_mean, dark_variance, window.weights, dark.frames)
     u_dark_noise = _u_noise(window, dark_variance / dark.frames)
     # In another pose the light in a dark is between none and twice as much, with equal probability.

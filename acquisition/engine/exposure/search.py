@@ -57,7 +57,7 @@ class ExposureSearch:
 
     def _suitable_s(self, frame: Frame, window: Window) -> float:
         """Return the exposure that suits the brightness of a frame."""
-        counted = frame.image[window.crop][window.counted]
+        counted = frame.brightest(window.crop)[window.counted]
         if not counted.size:
             return self.asked_s(frame.exposure_s)
         peak = bright_level(counted)

@@ -12,6 +12,7 @@ import pytest
 from acquisition.results.maps.sample_map import map_sample
 from analysis.sample_maps.files import npz_bytes
 from analysis.sample_maps.page import map_html
+from analysis.sample_maps.pictures import screen_colours
 from instrument.config.protocol import MapsConfig
 from instrument.devices import CHANNELS
 from instrument.errors import InputError
@@ -51,10 +52,22 @@ def test_each_channel_has_its_albedo_and_all_have_one_sigma(tmp_path: Path) -> N
     assert found.rejected[:, np.abs(found.x_mm) > CELL_MM].mean() < 0.02  # beside the edge: chance
     ratio = found.u_own["sigma_deg"] / mono.u_own["sigma_deg"]
     assert 0.5 < np.nanmedian(ratio) < 0.8  # three times the light, less what channels share
-    page = map_html(found)
-    assert "Albedo in colour" in page
-    assert "albedo, blue" in page
     assert b"u_albedo_b" in npz_bytes(found)
+    assert found.colour is not None
+    drawn = screen_colours(found.colour)
+    fitted = found.fitted
+    assert np.array_equal(drawn[..., 3], fitted)
+    assert np.array_equal(
+        np.argmax(drawn[fitted][:, :3], axis=-1), np.argmax(found.colour[fitted], axis=-1)
+    )
+
+
+def test_colours_on_a_screen_are_those_of_srgb() -> None:
+    """Grey of 18 % is 118 of 255 (IEC 61966-2-1); more than white is white."""
+    drawn = screen_colours(np.array([[[0.18, 0.18, 0.18], [1.3, 0.0, np.nan], [1.2, 0.0, 1.0]]]))
+    assert np.rint(255 * drawn[0, 0, :3]).tolist() == [118, 118, 118]
+    assert drawn[0, :, 3].tolist() == [1, 0, 1]
+    assert drawn[0, 2, :3] == pytest.approx([1, 0, 1])
 
 
 def test_without_what_tells_the_responses_there_is_one_channel_or_an_error(tmp_path: Path) -> None:
@@ -91,6 +104,10 @@ def test_the_truth_lies_within_u_in_about_95_percent_of_the_cells(
         found, loaded = varied.mapped(tmp_path / f"run {number}")
         true = truth(found, loaded)
         rejected.append(found.rejected_share)
+        if not number:
+            page = map_html(found)
+            assert "Albedo in colour" in page
+            assert "albedo, blue" in page
         for name, cells in inside.items():
             off = np.abs(found.values[name] - true[name]) / found.u(name)
             cells.append(off[np.isfinite(off)] < 1.96)
