@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from acquisition.cli import main
 from acquisition.terminal import streams
 from acquisition.terminal.streams import HANDLER, lasting_streams
+from tests.support.analysis.no_charts import WITHOUT_CHARTS
 from tests.support.command import finished_run, gonio_here, own_signals
 from tests.support.paths import ROOT
 from tests.support.scans import TWO_MODELS, small_demo
@@ -77,12 +78,8 @@ def test_a_fit_whose_output_is_lost_ends_as_it_would_have(lost: str, finished: P
     lose = (
         f"import os, sys; {LOST[lost]}; os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
     )
-    without_charts = (
-        "from tests.support.analysis.no_charts import leave_charts_out; leave_charts_out(); "
-        "from acquisition.entry import main; main()"
-    )
     done = subprocess.run(
-        [sys.executable, "-c", lose, "-c", without_charts, "report", finished],
+        [sys.executable, "-c", lose, "-c", WITHOUT_CHARTS, "report", finished],
         cwd=ROOT, capture_output=True, check=False, timeout=120,
     )  # fmt: skip
     assert done.returncode == 0

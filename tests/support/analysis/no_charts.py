@@ -4,6 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+WITHOUT_CHARTS = (
+    "from tests.support.analysis.no_charts import leave_charts_out; leave_charts_out(); "
+    "from acquisition.entry import main; main()"
+)
+"""Program, for `python -c`, that does what `python -m acquisition` does, without charts."""
+
 
 def leave_charts_out(patch: pytest.MonkeyPatch | None = None) -> None:
     """Leave empty the charts of the reports of this process, until `patch` is undone."""
