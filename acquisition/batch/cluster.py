@@ -5,7 +5,8 @@ Dask is an extra, imported only here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+import logging
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
 from typing import Any, TypeVar
 
@@ -16,6 +17,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 ANSWER_S = 5  # time allowed for a scheduler to answer
+_GONE = "the Dask scheduler is gone: look at it, and run the command again"
 
 
 def connected(address: str) -> Any:
@@ -29,6 +31,8 @@ def connected(address: str) -> Any:
         raise InputError(
             "--scheduler needs Dask, which this Python does not have: pip install 'gonio[cluster]'"
         ) from None
+    for name in ("distributed", "distributed.client"):  # what they log is told by our errors
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         return Client(address, timeout=ANSWER_S)
     except (OSError, ValueError, TypeError) as error:
@@ -51,26 +55,33 @@ def on_cluster(
     `work`: a function of a module that all workers have. Closing the iterator, or the client, takes
     back what has not begun. Raises `DeviceError` where the scheduler is lost.
     """
-    from distributed import KilledWorker, as_completed
-
-    waiting = {client.submit(work, item, pure=False): item for item in items}
+    waiting: dict[Any, Item] = {}
     try:
-        for future in as_completed(list(waiting)):
-            item = waiting.pop(future)
-            if future.status == "cancelled":
-                raise DeviceError(
-                    "the Dask scheduler is gone: look at it, and run the command again"
-                )
-            result: Result | Lost
-            try:
-                result = future.result()
-            except KilledWorker as error:
-                result = Lost(f"its workers ended each time: {_short(error)}")
-            future.release()
-            yield item, result
+        waiting.update({client.submit(work, item, pure=False): item for item in items})
+        yield from _results(waiting)
+    except Exception as error:
+        if client.status == "running":
+            raise
+        raise DeviceError(_GONE) from error
     finally:
         with suppress(OSError):  # the scheduler is gone, and what waits with it
             client.cancel(list(waiting))
+
+
+def _results(waiting: dict[Any, Item]) -> Iterator[tuple[Item, Any]]:
+    """Yield results as they are done, and remove their futures from `waiting`."""
+    from distributed import KilledWorker, as_completed
+
+    for future in as_completed(list(waiting)):
+        item = waiting.pop(future)
+        if future.status in ("cancelled", "lost"):
+            raise DeviceError(_GONE)
+        try:
+            result = future.result()
+        except KilledWorker as error:
+            result = Lost(f"its workers ended each time: {_short(error)}")
+        future.release()
+        yield item, result
 
 
 def _short(error: BaseException) -> str:

@@ -1,7 +1,7 @@
-"""Dask cluster of two worker processes, in a process of its own: its loop belongs to no test.
+"""Dask cluster of a few worker processes, in a process of its own: its loop belongs to no test.
 
-`python -m tests.support.batch.local_cluster` prints the scheduler's address and runs until its
-standard input ends.
+`python -m tests.support.batch.local_cluster WORKERS` prints the address of its scheduler and
+runs until its standard input ends.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from tests.support.paths import ROOT
 
 
 @contextmanager
-def local_cluster() -> Iterator[str]:
-    """Run a cluster and yield the address of its scheduler."""
+def local_cluster(workers: int = 2) -> Iterator[str]:
+    """Run a cluster and yield the address of its scheduler; leaving the block ends it."""
     with subprocess.Popen(
-        [sys.executable, "-m", "tests.support.batch.local_cluster"],
+        [sys.executable, "-m", "tests.support.batch.local_cluster", str(workers)],
         cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
         text=True,
     ) as process:  # fmt: skip
@@ -33,7 +33,7 @@ def main() -> None:
     from distributed import LocalCluster
 
     with LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        n_workers=int(sys.argv[1]), threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
         sys.stdout.write(f"{cluster.scheduler_address}\n")
         sys.stdout.flush()

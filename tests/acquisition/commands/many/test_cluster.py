@@ -92,6 +92,19 @@ def test_a_stop_takes_back_what_waits(folder: Path, tmp_path: Path, scheduler: s
     wait_for(lambda: _opened(pipe), "the worker is released")
 
 
+def test_a_lost_scheduler_ends_the_command_in_one_line(folder: Path) -> None:
+    with local_cluster(workers=0) as address:
+        main = subprocess.Popen(
+            [sys.executable, "-m", "acquisition", "fit", "--all", folder, "--scheduler", address],
+            cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        assert main.stderr is not None
+        assert main.stderr.readline().startswith(f"{address} has no worker yet: dask worker")
+    printed, errors = main.communicate(timeout=60)
+    assert (main.returncode, printed) == (3, "")
+    assert errors == "the Dask scheduler is gone: look at it, and run the command again\n"
+
+
 def _opened(pipe: Path) -> bool:
     """Open the pipe for the reader that waits for it, who finds it empty."""
     try:
