@@ -60,7 +60,8 @@ class CameraDevice:
         return self._motion.begin_ready(self._light_sample)
 
     def unstage(self) -> ActionStatus:
-        """Close the lamp's shutter, if it has one, after what was asked for before."""
+        """Halt the axes, which staging may still be homing; then close the lamp's shutter."""
+        self._motion.halt_all()
         return self._thread.begin(self._close_shutter)
 
     def trigger(self) -> ActionStatus:

@@ -66,6 +66,18 @@ class Motion:
         self.axes[name].halt(expected=expected)
         self.axes[name].finish_stop()
 
+    def halt_all(self) -> None:
+        """Halt every axis now, from any thread, and return once all were read to stand."""
+        if not self._thread.closed:
+            self.begin_halt()
+            for axis in self.axes.values():
+                axis.finish_stop()
+
+    def begin_halt(self) -> None:
+        """Halt every axis now, without waiting for its effect."""
+        for axis in self.axes.values():
+            axis.halt()
+
     def require_within(self, name: str, angle_deg: float) -> None:
         """Raise `InputError` for an angle in degrees outside an axis's limits in the rig file."""
         own = self._rig.axes[name]

@@ -96,7 +96,6 @@ class RigDevices(Closeable):
         """Stop all motion, close the shutter and release the devices; may be called twice."""
         if self._thread.closed:
             return
-        for axis in (self.theta_i, self.dphi, self.theta_r):
-            self._motion.axes[axis.name].halt()
+        self._motion.begin_halt()
         self._thread.begin(self._motion.make_safe)
         self._closing.close()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import numpy as np
 import pytest
 
 from acquisition.facility.devices.rig_devices import RigDevices
+from sim.scene.stage import SimulatedStage
 from tests.support.facility.run_engine import (
     DEADLINE_S,
     HeldMoves,
@@ -140,4 +142,26 @@ def test_a_lamp_that_a_plan_has_lit_is_dark_in_a_pause_and_at_the_end(rig: RigDe
     engine.resume()
     assert seen == ["light"]
     rig.close()
+    assert rig.lamp.read()["lamp"]["value"] == "dark"
+
+
+def test_what_a_camera_s_staging_is_homing_is_halted_when_it_is_unstaged(
+    rig: RigDevices, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, go_on = threading.Event(), threading.Event()
+    home = SimulatedStage.home
+
+    def slow_home(stage: SimulatedStage) -> None:
+        begun.set()
+        assert go_on.wait(DEADLINE_S)
+        home(stage)
+
+    monkeypatch.setattr(SimulatedStage, "home", slow_home)
+    staged = rig.camera.stage()
+    assert begun.wait(DEADLINE_S)
+    unstaged = rig.camera.unstage()
+    go_on.set()
+    error = staged.exception(DEADLINE_S)
+    assert "halted, not homed" in str(error)  # the next axis is not begun
+    assert unstaged.exception(DEADLINE_S) is None
     assert rig.lamp.read()["lamp"]["value"] == "dark"
