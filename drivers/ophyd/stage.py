@@ -88,7 +88,7 @@ class OphydStage(MotorStage):
         self._move = self._run(f"move to {angle_deg:g} deg", _begun(self._motor, angle_deg))
 
     def _send_stop(self) -> None:
-        self._run("stop", self._motor.stop(success=False))
+        self._run("stop", self._motor.stop(success=True))  # else its error is told to nobody
         if self._move is not None and self._move.done:
             self._move = None
 
