@@ -23,7 +23,7 @@ MATERIALS = ("oren_nayar", "oren_nayar+torrance_sparrow", "lambert+ggx", "minnae
 # chi2 of a model that is hopeless, over its least; and over that of the best model, from which on
 # its value does not matter.
 MOST_ABOVE, OUT_OF_QUESTION = 1.2, 100.0
-BOUNDED = (1, 4, 6)  # seeds
+BOUNDED = (1, 4)  # seeds
 FACTOR = 8  # of the number of points, from the program's limits to those of the bounded form
 
 

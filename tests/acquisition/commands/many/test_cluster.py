@@ -14,8 +14,10 @@ from pathlib import Path
 
 import pytest
 
+from acquisition.batch import cluster
 from acquisition.batch.cluster import connected, on_cluster
 from acquisition.batch.lost import Lost
+from instrument.errors import InputError
 from tests.support.batch.local_cluster import local_cluster
 from tests.support.batch.tables import MODELS, write_tables
 from tests.support.batch.work import Item, attempts, squared
@@ -114,12 +116,16 @@ def _opened(pipe: Path) -> bool:
     return True
 
 
-@pytest.mark.parametrize("port", ["free", "word"])
-def test_an_address_without_a_scheduler_is_refused(folder: Path, port: str) -> None:
-    if port == "free":
-        with closing(socket.create_server(("127.0.0.1", 0))) as taken:
-            port = str(taken.getsockname()[1])
-    done = gonio("fit", "--all", folder, "--scheduler", f"tcp://127.0.0.1:{port}")
+def test_an_address_that_is_none_is_refused(folder: Path) -> None:
+    done = gonio("fit", "--all", folder, "--scheduler", "tcp://127.0.0.1:word")
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith(f"--scheduler tcp://127.0.0.1:{port}: no Dask scheduler answers")
+    assert done.stderr.startswith("--scheduler tcp://127.0.0.1:word: no Dask scheduler answers")
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_an_address_without_a_scheduler_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "ANSWER_S", 0.5)
+    with closing(socket.create_server(("127.0.0.1", 0))) as taken:
+        address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
+    with pytest.raises(InputError, match=f"--scheduler {address}: no Dask scheduler answers"):
+        cluster.connected(address)
