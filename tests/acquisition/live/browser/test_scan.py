@@ -70,7 +70,7 @@ def test_a_scan_is_paused_resumed_and_aborted_on_the_page(
     with live_command(tmp_path / "said", *arguments) as scan:
         page = windows.open(scan.address)
         state, note = page.locator("#state-name"), page.locator("#chart-note")
-        expect(note).to_contain_text(re.compile(r"^[1-9]\d* of 13 points"))
+        expect(note).to_contain_text(re.compile(r"^[1-9]\d* of 14 points"))
         page.keyboard.press("p")
         expect(state).to_have_text("Paused")
         paused_at = readings(run)
@@ -100,7 +100,7 @@ def test_a_scan_is_paused_resumed_and_aborted_on_the_page(
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["verdict"] == "adequate"
     with Record.open(run) as record:
-        assert sum(r.kind == "point" for r in record.rows().readings) == 13
+        assert sum(r.kind == "point" for r in record.rows().readings) == 14
 
 
 def test_the_lens_is_aimed_with_the_emulated_camera(
