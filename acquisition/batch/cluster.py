@@ -52,9 +52,24 @@ def on_cluster(
 ) -> Generator[tuple[Item, Result | Lost], None, None]:
     """Yield each item with its result, in the order in which they are done.
 
-    `work`: a function of a module that all workers have. Closing the iterator, or the client, takes
-    back what has not begun. Raises `DeviceError` where the scheduler is lost.
+    Dask blames all that a worker had when it ended: items that are lost so are worked on again, one
+    at a time. `work`: a function of a module that all workers have. Closing the iterator, or the
+    client, takes back what has not begun. Raises `DeviceError` where the scheduler is lost.
     """
+    blamed = list[Item]()
+    for item, result in _at_once(work, items, client):
+        if isinstance(result, Lost):
+            blamed.append(item)
+        else:
+            yield item, result
+    for item in blamed:
+        yield from _at_once(work, [item], client)
+
+
+def _at_once(
+    work: Callable[[Item], Result], items: Sequence[Item], client: Any
+) -> Generator[tuple[Item, Result | Lost], None, None]:
+    """Yield each item with its result; all of them are handed over at once."""
     waiting: dict[Any, Item] = {}
     try:
         waiting.update({client.submit(work, item, pure=False): item for item in items})
