@@ -6,7 +6,14 @@ from dataclasses import asdict, fields
 from pathlib import Path
 
 from acquisition.facility.devices.actions import ActionStatus, ActionThread
-from acquisition.facility.devices.readings import KeyDict, ReadingDict, Value, data_key, reading
+from acquisition.facility.devices.readings import (
+    KeyDict,
+    ReadingDict,
+    Value,
+    data_key,
+    data_keys,
+    readings,
+)
 from acquisition.facility.scan_session import ScanSession
 from acquisition.facility.table_columns import Columns, columns_of
 from acquisition.plan.plan import Plan
@@ -91,8 +98,7 @@ class ScanDevice:
         last = self._session.reading
         if last is None:
             raise DeviceError("scan: no step has been measured yet")
-        now_s = self._session.now_s()
-        return {name: reading(value, now_s) for name, value in asdict(last).items()}
+        return readings(asdict(last), self._session.now_s())
 
     def describe(self) -> dict[str, KeyDict]:
         """Return the units of what `read` returns."""
@@ -100,12 +106,11 @@ class ScanDevice:
 
     def read_configuration(self) -> dict[str, ReadingDict]:
         """Return which devices answered."""
-        now_s = self._session.now_s()
-        return {name: reading(value, now_s) for name, value in self._configuration().items()}
+        return readings(self._configuration(), self._session.now_s())
 
     def describe_configuration(self) -> dict[str, KeyDict]:
         """Return the description of what `read_configuration` returns."""
-        return {name: data_key(name, str, SOURCE) for name in self._configuration()}
+        return data_keys(self._configuration(), SOURCE)
 
     def table(self) -> TableDevice:
         """Return the device of the scan's table, whose staging ends the scan."""
@@ -151,8 +156,8 @@ class TableDevice:
 
     def read(self) -> dict[str, ReadingDict]:
         """Return one row of measurements.csv."""
-        now_s = self._session.now_s()
-        return {name: reading(col[self._row], now_s) for name, col in self._columns.items()}
+        row = {name: column[self._row] for name, column in self._columns.items()}
+        return readings(row, self._session.now_s())
 
     def describe(self) -> dict[str, KeyDict]:
         """Return the units of the columns."""

@@ -7,7 +7,15 @@ from numbers import Real
 
 from acquisition.facility.devices.actions import ActionStatus
 from acquisition.facility.devices.motion import Motion
-from acquisition.facility.devices.readings import KeyDict, ReadingDict, Value, data_key, reading
+from acquisition.facility.devices.readings import (
+    KeyDict,
+    ReadingDict,
+    Value,
+    data_key,
+    data_keys,
+    reading,
+    readings,
+)
 from instrument.clock import Clock
 from instrument.config.axes import HandAxis, MotorAxis
 from instrument.errors import InputError
@@ -72,13 +80,11 @@ class AxisDevice:
 
     def read_configuration(self) -> dict[str, ReadingDict]:
         """Return what answers, and the limits and the u of the rig file in degrees."""
-        now_s = self._clock.utc().timestamp()
-        return {name: reading(value, now_s) for name, value in self._configuration().items()}
+        return readings(self._configuration(), self._clock.utc().timestamp())
 
     def describe_configuration(self) -> dict[str, KeyDict]:
         """Return the units of what `read_configuration` returns."""
-        source = f"gonio:{self.name}"
-        return {n: data_key(n, type(v), source) for n, v in self._configuration().items()}
+        return data_keys(self._configuration(), f"gonio:{self.name}")
 
     def _configuration(self) -> dict[str, Value]:
         own = self._settings

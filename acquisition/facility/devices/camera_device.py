@@ -5,7 +5,15 @@ from __future__ import annotations
 from acquisition.engine.onlookers import KnownLamp
 from acquisition.facility.devices.actions import ActionStatus, ActionThread
 from acquisition.facility.devices.motion import Motion
-from acquisition.facility.devices.readings import KeyDict, ReadingDict, Value, data_key, reading
+from acquisition.facility.devices.readings import (
+    KeyDict,
+    ReadingDict,
+    Value,
+    data_key,
+    data_keys,
+    reading,
+    readings,
+)
 from acquisition.facility.devices.window_camera import WindowCamera
 from instrument.clock import Clock
 from instrument.config.rig import Rig
@@ -82,13 +90,11 @@ class CameraDevice:
 
     def read_configuration(self) -> dict[str, ReadingDict]:
         """Return what answers, and what a reading consists of."""
-        now_s = self._clock.utc().timestamp()
-        return {name: reading(value, now_s) for name, value in self._configuration().items()}
+        return readings(self._configuration(), self._clock.utc().timestamp())
 
     def describe_configuration(self) -> dict[str, KeyDict]:
         """Return the units of what `read_configuration` returns."""
-        own = f"gonio:{self.name}"
-        return {name: data_key(name, type(v), own) for name, v in self._configuration().items()}
+        return data_keys(self._configuration(), f"gonio:{self.name}")
 
     def _configuration(self) -> dict[str, Value]:
         exposing, name = self._camera.exposing, self.name

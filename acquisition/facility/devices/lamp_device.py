@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from acquisition.engine.onlookers import KnownLamp
 from acquisition.facility.devices.actions import ActionStatus, ActionThread
-from acquisition.facility.devices.readings import KeyDict, ReadingDict, Value, data_key, reading
+from acquisition.facility.devices.readings import (
+    KeyDict,
+    ReadingDict,
+    Value,
+    data_key,
+    data_keys,
+    reading,
+    readings,
+)
 from instrument.clock import Clock
 from instrument.config.rig import Rig
 from instrument.errors import InputError
@@ -75,13 +83,11 @@ class LampDevice:
 
     def read_configuration(self) -> dict[str, ReadingDict]:
         """Return what darkens the lamp."""
-        now_s = self._clock.utc().timestamp()
-        return {name: reading(value, now_s) for name, value in self._configuration().items()}
+        return readings(self._configuration(), self._clock.utc().timestamp())
 
     def describe_configuration(self) -> dict[str, KeyDict]:
         """Return the description of what `read_configuration` returns."""
-        own = f"gonio:{self.name}"
-        return {name: data_key(name, str, own) for name in self._configuration()}
+        return data_keys(self._configuration(), f"gonio:{self.name}")
 
     def _configuration(self) -> dict[str, Value]:
         return {f"{self.name}_identity": self._lamp.identity()}

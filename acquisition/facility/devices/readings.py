@@ -36,6 +36,16 @@ def reading(value: Value, time_s: float) -> ReadingDict:
     return {"value": value, "timestamp": time_s}
 
 
+def readings(values: Mapping[str, Value], time_s: float) -> dict[str, ReadingDict]:
+    """Return readings of values by name, taken together; time_s: seconds of the Unix epoch."""
+    return {name: reading(value, time_s) for name, value in values.items()}
+
+
+def data_keys(values: Mapping[str, Value], source: str) -> dict[str, KeyDict]:
+    """Return the descriptions of values by name, each with the unit that its name states."""
+    return {name: data_key(name, type(value), source) for name, value in values.items()}
+
+
 def data_key(name: str, kind: type, source: str, units: str | None = None) -> KeyDict:
     """Return the description of a value whose type is `kind`: float, int or str."""
     dtype, numpy = _DTYPES[kind]
