@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,35 +21,23 @@ from instrument.text.text_file import TextFile
 class Cells:
     """Rows to fit, (N,): line and text of each. Mistakes are noted in the file.
 
-    at_once: numbers (N,) by the name of their column, of columns without a mistake.
+    at_once: (N,) by the name of their column, the numbers that NumPy read; see `of`.
     """
 
     file: TextFile
     header: Header
     lines: list[int]
     texts: list[str]
-    at_once: dict[str, FloatArray] = field(default_factory=dict)
+    at_once: dict[str, FloatArray]
 
-    def read(self) -> None:
-        """Read all columns that hold a number in the first row; those without a mistake at once.
-
-        NumPy's reader takes the same numbers as Python, but without underscores, as `Column` does.
-        """
-        if not self.texts or any('"' in text for text in self.texts):
-            return
-        first = self.texts[0].split(",")
-        found = {name: k for name, k in self.header.indices.items() if _is_number(first[k])}
-        try:
-            values = np.loadtxt(
-                self.texts, delimiter=",", comments=None, usecols=[*found.values()], ndmin=2
-            )
-        except ValueError:  # the cell that is no number is looked for, and named, by its column
-            return
-        self.at_once.update(zip(found, values.T, strict=True))
+    @classmethod
+    def of(cls, file: TextFile, header: Header, lines: list[int], texts: list[str]) -> Cells:
+        """Return the rows, with the columns that hold a number in the first row read at once."""
+        return cls(file, header, lines, texts, _at_once(header, texts))
 
     def needed(self, column: Column) -> FloatArray:
         """Numbers (N,) of a column, in its unit; NaN where there is none, which is a mistake."""
-        known = self._at_once(column)
+        known = self._read(column)
         return self._parsed(column, self._texts(column)) if known is None else known
 
     def numbers(self, column: Column) -> FloatArray | None:
@@ -57,13 +45,13 @@ class Cells:
 
         NaN where there is none, or none that is allowed, which is a mistake.
         """
-        known = self._at_once(column)
+        known = self._read(column)
         if known is not None or column.name not in self.header.indices:
             return known
         texts = self._texts(column)
         return self._parsed(column, texts) if any(text.strip() for text in texts) else None
 
-    def _at_once(self, column: Column) -> FloatArray | None:
+    def _read(self, column: Column) -> FloatArray | None:
         """Numbers (N,) of a column that was read at once, if all of them are allowed."""
         values = self.at_once.get(column.name)
         return values if values is not None and column.allows(values) else None
@@ -140,6 +128,22 @@ class Cells:
     def _note(self, line: int, name: str, what: str) -> None:
         start = column_of(self.file.lines[line - 1], self.header.indices[name])
         self.file.note(line, start, f"{name}: {what}")
+
+
+def _at_once(header: Header, texts: list[str]) -> dict[str, FloatArray]:
+    """Return the numbers (N,) of all columns that hold one in the first row; none for a mistake.
+
+    NumPy's reader takes the same numbers as Python, but without underscores, as `Column` does.
+    """
+    if not texts or any('"' in text for text in texts):
+        return {}
+    first = texts[0].split(",")
+    found = {name: k for name, k in header.indices.items() if _is_number(first[k])}
+    try:
+        values = np.loadtxt(texts, delimiter=",", comments=None, usecols=[*found.values()], ndmin=2)
+    except ValueError:  # the cell that is no number is looked for, and named, by its column
+        return {}
+    return dict(zip(found, values.T, strict=True))
 
 
 def _is_number(text: str) -> bool:

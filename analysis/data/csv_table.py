@@ -161,8 +161,7 @@ class _Table:
             what = f"header: no row follows; allowed: {ROWS}"
             self.file.note(self.header.line, 1, what)
             raise input_error(self.file)
-        cells = Cells(self.file, self.header, self.lines, self.texts)
-        cells.read()
+        cells = Cells.of(self.file, self.header, self.lines, self.texts)
         theta_i, theta_r, dphi = (cells.needed(column) for column in ANGLES)
         if not self.repeats:
             self._note_repeats(cells, theta_i, theta_r, dphi)
