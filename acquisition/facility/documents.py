@@ -17,7 +17,12 @@ from uuid import NAMESPACE_URL, UUID, uuid5
 
 from acquisition.facility.devices.readings import KeyDict, Value
 from acquisition.facility.metadata import KEYS, READINGS, TABLE, start_metadata
-from acquisition.facility.scan_device import column_keys, reading_keys
+from acquisition.facility.scan_device import (
+    column_keys,
+    configuration_keys,
+    configuration_of,
+    reading_keys,
+)
 from acquisition.facility.table_columns import columns_of
 from acquisition.results.facts.chosen_geometries import reasons
 from acquisition.results.fitting import fit_run
@@ -110,8 +115,7 @@ def _stream_documents(stream: _Stream, bundle: Any, run: UUID) -> Iterator[Docum
 
 
 def _configuration(identities: Mapping[str, str], time_s: float) -> dict[str, Any]:
-    data = {f"{role}_identity": text for role, text in identities.items()}
-    keys = {name: {"source": "gonio:scan", "dtype": "string", "shape": []} for name in data}
+    data, keys = configuration_of(identities), configuration_keys(identities)
     return {"data": data, "timestamps": dict.fromkeys(data, time_s), "data_keys": keys}
 
 

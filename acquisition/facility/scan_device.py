@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
 
@@ -34,6 +35,16 @@ def reading_keys() -> dict[str, KeyDict]:
 def column_keys(columns: Columns) -> dict[str, KeyDict]:
     """Return the description of each column of a table, with its unit."""
     return {name: data_key(name, type(col[0]), SOURCE) for name, col in columns.items()}
+
+
+def configuration_of(identities: Mapping[str, str]) -> dict[str, Value]:
+    """Return which devices answered, by role, as configuration of a scan."""
+    return {f"{role}_identity": text for role, text in identities.items()}
+
+
+def configuration_keys(identities: Mapping[str, str]) -> dict[str, KeyDict]:
+    """Return the description of each value of `configuration_of`."""
+    return data_keys(configuration_of(identities), SOURCE)
 
 
 class ScanDevice:
@@ -106,18 +117,15 @@ class ScanDevice:
 
     def read_configuration(self) -> dict[str, ReadingDict]:
         """Return which devices answered."""
-        return readings(self._configuration(), self._session.now_s())
+        return readings(configuration_of(self._session.identities), self._session.now_s())
 
     def describe_configuration(self) -> dict[str, KeyDict]:
         """Return the description of what `read_configuration` returns."""
-        return data_keys(self._configuration(), SOURCE)
+        return configuration_keys(self._session.identities)
 
     def table(self) -> TableDevice:
         """Return the device of the scan's table, whose staging ends the scan."""
         return TableDevice(self._thread, self._session)
-
-    def _configuration(self) -> dict[str, Value]:
-        return {f"{role}_identity": text for role, text in self._session.identities.items()}
 
 
 class TableDevice:

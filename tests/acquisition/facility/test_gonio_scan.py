@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from acquisition.commands.scan import scan_into
+from acquisition.facility.documents import run_documents
 from acquisition.facility.metadata import READINGS, TABLE
 from acquisition.facility.plans import gonio_scan
 from acquisition.facility.table_columns import columns_of, table_of
@@ -91,6 +92,25 @@ def test_the_documents_give_the_same_table(scanned: tuple[Path, Documents], prot
     start = documents[0][1]
     assert (start["sample"], start["rig"], start["proposal"]) == ("foam", "bench_12bit", "24-1")
     assert start["gonio"]["protocol"] == protocol.read_text()
+
+
+def test_documents_made_from_the_record_describe_the_same_values(
+    scanned: tuple[Path, Documents],
+) -> None:
+    run, documents = scanned
+    emitted, made = (_descriptors(found) for found in (documents, list(run_documents(run))))
+    for stream in (READINGS, TABLE):
+        keys = made[stream]["data_keys"]
+        assert list(keys) == list(emitted[stream]["data_keys"])
+        for name, key in emitted[stream]["data_keys"].items():
+            assert keys[name] == {k: v for k, v in key.items() if k != "object_name"}
+    own, other = (found[READINGS]["configuration"]["scan"] for found in (made, emitted))
+    assert own["data"]
+    assert (own["data"], own["data_keys"]) == (other["data"], other["data_keys"])
+
+
+def _descriptors(documents: Documents) -> dict[str, dict[str, Any]]:
+    return {d["name"]: d for n, d in documents if n == "descriptor"}
 
 
 def test_every_number_of_an_event_has_a_unit_where_it_has_one(
