@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,6 +13,7 @@ from analysis.accuracy.rough_surface import ROUGH_SURFACE
 from analysis.choice.ladder import SAME_PREDICTION, functional_form
 from analysis.data.acceptance import Acceptance
 from analysis.data.measurements import Measurements
+from analysis.fit.criteria import enough_chi2
 from analysis.fit.first_fit import FirstFit, FirstFits, enough_points
 from analysis.fit.fit import FitResult, refine
 from analysis.fit.relative_scale import FACTOR_NAME, normalise_lamp_levels
@@ -19,23 +21,24 @@ from analysis.models import MODELS, Model
 from instrument.errors import NotDetermined
 
 # chi2 relative to the lowest, both on a part of very many points: a smaller model that is preferred
-# to a larger one has hardly more.
-_HOPELESS = 1.5
+# to a larger one has hardly more. It is beyond this factor with all points as well.
+_HOPELESS, _HOPELESS_OF_ALL = 1.5, 1.25
 
 
 @dataclass(frozen=True, slots=True)
 class Candidates:
     """First fits to the measurements in the order of the names, and models left out.
 
-    every: fit an integrated model even where its functional form is accurate enough. screened: of
-    very many points, fit a model roughly that is far behind on a part of them.
-    left_out: models with too many parameters for the points.
+    every: fit an integrated model even where its functional form is accurate enough. ladder: rungs
+    of all candidates, of which, of very many points, those are fitted roughly that are far behind
+    on a part of them; empty: all are fitted. left_out: models with too many parameters for the
+    points.
     """
 
     fits: FirstFits
     robust: bool
     every: bool
-    screened: bool
+    ladder: Sequence[Sequence[str]] = ()
     first: tuple[FirstFit, ...] = ()
     left_out: tuple[str, ...] = ()
 
@@ -46,13 +49,13 @@ class Candidates:
         measurements: Measurements,
         robust: bool,
         every: bool,
-        screened: bool = False,
+        ladder: Sequence[Sequence[str]] = (),
     ) -> Candidates:
         """First fits of the named models.
 
         Raises `NotDetermined` where the points are too few for all, `KeyError` for an unknown one.
         """
-        found = cls(FirstFits(measurements), robust, every, screened).with_more(names)
+        found = cls(FirstFits(measurements), robust, every, ladder).with_more(names)
         if not found.first:
             n = measurements.size
             few = "1 point is" if n == 1 else f"{n} points are"
@@ -70,7 +73,7 @@ class Candidates:
         first = {f.model.name: f for f in self.first}
         named = [MODELS[name] for name in names]
         enough = [model for model in named if enough_points(model, m)]
-        hopeless = self._hopeless(enough) if self.screened else set()
+        hopeless = self._hopeless(enough) if self.ladder else set()
         for model in enough:
             form = first.get(functional_form(model.name) or "")
             if self.every or form is None or _form_inaccurate(form, m):
@@ -82,26 +85,38 @@ class Candidates:
     def _hopeless(self, models: Sequence[Model]) -> set[str]:
         """Models whose chi2 on a part of very many points is far above the lowest there.
 
-        Their search is not followed to the end: chi2 is known to about a hundredth, which is no
-        reason to prefer one. Only for points that share no errors, which else may explain most of
-        chi2.
+        They are fitted to the part alone: chi2 of all points is then known to about a hundredth,
+        which is no reason to prefer one. Only for points that share no errors, which else may
+        explain most of chi2.
         """
         part = self.fits.part
         if part is None:
             return set()
         chi2 = {model.name: part.of(model).solution.chi2 for model in models}
-        least = min([*chi2.values(), *(one.solution.chi2 for one in part.made.values())])
+        least = min(*chi2.values(), _least_chi2(part, self.ladder))
         return {name for name, own in chi2.items() if own > _HOPELESS * least}
+
+    def checked(self) -> Candidates:
+        """The candidates, with those fitted to all points that are not far behind there.
+
+        Without this a model would be left out whose misfit lies where the part has many points.
+        """
+        least = min((f.solution.chi2 for f in self.first if not f.rough), default=math.inf)
+        most = _HOPELESS_OF_ALL * least
+        checked = (
+            self.fits.of(f.model) if f.rough and f.solution.chi2 <= most else f for f in self.first
+        )
+        return replace(self, first=tuple(checked))
 
     def refined(
         self,
         acceptance: Acceptance | None,
         already: Container[str] = (),
     ) -> tuple[FitResult, ...]:
-        """Fit each, but for those `already` fitted, as `fit` does, without profiled intervals."""
+        """Fit each, but for those `already` fitted, as `fit` does, without u of the parameters."""
         m = self.fits.measurements
         return tuple(
-            refine(f, m, acceptance, self.robust, profiles=False)
+            refine(f, m, acceptance, self.robust, u="none")
             for f in self.first
             if f.model.name not in already
         )
@@ -109,12 +124,22 @@ class Candidates:
     def profiled(self, name: str, acceptance: Acceptance | None) -> FitResult:
         """Fit the candidate of that name with all uncertainties and intervals."""
         (own,) = (f for f in self.first if f.model.name == name)
-        return refine(
-            self.fits.of(own.model) if own.rough else own,
-            self.fits.measurements,
-            acceptance,
-            self.robust,
-        )
+        return refine(self.fits.polished(own), self.fits.measurements, acceptance, self.robust)
+
+
+def _least_chi2(part: FirstFits, ladder: Iterable[Sequence[str]]) -> float:
+    """Least chi2 of the models up to the first rung that explains the part of the points.
+
+    Without the integrated models, which are costly: a functional form is hardly farther off.
+    """
+    least = math.inf
+    for rung in ladder:
+        quick = [MODELS[name] for name in rung if functional_form(name) is None]
+        fits = [part.of(model) for model in quick]
+        least = min([least, *(one.solution.chi2 for one in fits)])
+        if any(one.solution.chi2 <= enough_chi2(part.measurements, one.problem) for one in fits):
+            break
+    return least
 
 
 def _best(first: Iterable[FirstFit]) -> FirstFit:

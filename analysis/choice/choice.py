@@ -8,7 +8,7 @@ explains the data. Within what was tried, each further parameter must improve Sc
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,7 +26,8 @@ from analysis.data.covariance import has_shared_errors
 from analysis.data.measurements import Measurements
 from analysis.fit.certificate import led_by_certificate
 from analysis.fit.criteria import LEAST_NOISE
-from analysis.fit.fit import FitResult
+from analysis.fit.first_fit import LEFT
+from analysis.fit.fit import FitResult, with_linear_u
 from analysis.models import MODELS
 
 # Largest number of parameters of the models that are tried together where the lamp's levels are
@@ -78,29 +79,30 @@ def choose(
     data and, within the models of up to three parameters, the next one, which may be right; an
     integrated model whose functional form is as accurate is then left out, unless a `method` for
     the rough surface is requested. Of more than 4000 points one that is far behind on a part of
-    them is fitted roughly. Models with too many parameters for the points are left out.
+    them is not fitted to all, if with all points it is far behind as well. Models with too many
+    parameters for the points are left out.
     `certificate_leads`: the chosen model's parameters are those at the scale of the certificate,
     which the model's form may else correct (`analysis.fit.certificate`).
     Raises `NotDetermined` when the points are too few for all of them or show no light, `KeyError`
     for an unknown model.
     """
     require_light(measurements)
-    first, *others = _rungs(measurements, models, method)
+    first, *others = ladder = _rungs(measurements, models, method)
     every = models is not None
-    screened = not (every or robust or acceptance or has_shared_errors(measurements))
-    tried = Candidates.of(first, measurements, robust, every, screened)
+    if every or robust or acceptance or has_shared_errors(measurements):
+        ladder = []
+    tried = Candidates.of(first, measurements, robust, every, ladder)
     fitted = _Fitted.of(tried.refined(acceptance), tried.measurements)
     for rung in others:
         explained = bool(fitted.within_u)
         if explained and len(MODELS[rung[0]].parameters) > _MOST_PARAMETERS_AHEAD:
             break
         tried = tried.with_more(rung)
-        known = {c.model for c in fitted.results}
-        new = _Fitted.of(tried.refined(acceptance, known), tried.measurements)
-        fitted = _Fitted((*fitted.results, *new.results), {**fitted.agreements, **new.agreements})
+        fitted = fitted.with_new(tried, acceptance)
         if explained:
             break
-    return _chosen(tried, fitted, acceptance, certificate_leads)
+    tried = tried.checked()
+    return _chosen(tried, fitted.with_new(tried, acceptance), acceptance, certificate_leads)
 
 
 def _rungs(
@@ -128,6 +130,15 @@ class _Fitted:
         """Judge each result."""
         return cls(results, {c.model: agreement(c, m) for c in results})
 
+    def with_new(self, tried: Candidates, acceptance: Acceptance | None) -> _Fitted:
+        """All results, with those that are new or were rough before."""
+        rough = {f.model.name for f in tried.first if f.rough}
+        known = {c.model: c for c in self.results if c.message != LEFT or c.model in rough}
+        new = _Fitted.of(tried.refined(acceptance, known), tried.measurements)
+        known |= {c.model: c for c in new.results}
+        results = tuple(known[f.model.name] for f in tried.first)
+        return _Fitted(results, {**self.agreements, **new.agreements})
+
     @property
     def within_u(self) -> list[FitResult]:
         """Candidates that agree within the stated u, or to rounding where none is stated."""
@@ -145,9 +156,8 @@ def _chosen(
 ) -> Choice:
     m, eligible = tried.measurements, fitted.eligible
     if not eligible:
-        shown = tuple(map(_best_values_only, fitted.results))
-        notes = free_check_notes(m)
-        return Choice(shown, None, "none adequate", "no fit converged", notes=notes)
+        notes, reason = free_check_notes(m), "no fit converged"
+        return Choice(fitted.results, None, "none adequate", reason, notes=notes)
     preferred, best = simplest(eligible, m), min(eligible, key=lambda c: c.bic)
     chosen = tried.profiled(preferred.model, acceptance)
     judged = agreement(chosen, m)
@@ -163,7 +173,7 @@ def _chosen(
         chosen = led_by_certificate(chosen, m)
     noise = max(chosen.rms_relative, LEAST_NOISE) * float(np.mean(m.brdf))
     return Choice(
-        candidates=tuple(_shown(c, chosen, agreeing) for c in fitted.results),
+        candidates=tuple(_shown(c, chosen, agreeing, m) for c in fitted.results),
         chosen=chosen.model,
         verdict=verdict,
         reason=reason,
@@ -174,26 +184,13 @@ def _chosen(
     )
 
 
-def _shown(candidate: FitResult, chosen: FitResult, agreeing: frozenset[str]) -> FitResult:
+def _shown(
+    candidate: FitResult, chosen: FitResult, agreeing: frozenset[str], m: Measurements
+) -> FitResult:
     """The chosen result whole; others with their best values, and u only where they agree."""
     if candidate.model == chosen.model:
         return chosen
-    if candidate.model in agreeing:
-        known = {name: r for name, r in candidate.ratios.items() if r.u is not None}
-        return replace(candidate, intervals={}, undetermined=(), ratios=known)
-    return _best_values_only(candidate)
-
-
-def _best_values_only(candidate: FitResult) -> FitResult:
-    unknown = np.full_like(candidate.correlation, np.nan)
-    return replace(
-        candidate,
-        u=dict.fromkeys(candidate.u),
-        intervals={},
-        undetermined=(),
-        correlation=unknown,
-        ratios={},
-    )
+    return with_linear_u(candidate, m) if candidate.model in agreeing else candidate
 
 
 def _verdict(chosen: FitResult, judged: Agreement, m: Measurements) -> tuple[str, str]:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from analysis.choice.cross_validation import folds, held_out_error
+from analysis.choice.cross_validation import FEW, folds, held_out_error
 from analysis.choice.ladder import SAME_PREDICTION, physics
 from analysis.data.measurements import Measurements
 from analysis.fit.criteria import SIGNIFICANCE, probability
 from analysis.fit.fit import FitResult
+from instrument.geometry import BoolArray
 
 # Kass and Raftery, "Bayes Factors", 1995: a difference of BIC up to 2 is "not worth more than a
 # bare mention"; one above 6 is "strong" evidence. Further parameters need it: many models that have
@@ -19,6 +21,8 @@ from analysis.fit.fit import FitResult
 TIE_BIC, STRONG_BIC = 2.0, 6.0
 # Ratio of chi2 up to which a cheaper method with the same predictions is preferred.
 SAME_CHI2 = 2.0
+# Errors of prediction that differ by no more than this factor are computed with all points.
+_NEARLY_EQUAL = 1.03
 
 
 def simplest(converged: Iterable[FitResult], measurements: Measurements) -> FitResult:
@@ -29,26 +33,46 @@ def simplest(converged: Iterable[FitResult], measurements: Measurements) -> FitR
     """
     current, *larger = sorted(converged, key=lambda c: c.x.size)  # stable: the ladder's order
     best = min((current, *larger), key=lambda c: c.bic)
-    left_out = folds(measurements) if larger else []
-    scores: dict[str, float] = {}
-
-    def score(candidate: FitResult) -> float:
-        if candidate.model not in scores:
-            scores[candidate.model] = held_out_error(
-                measurements, candidate.problem, candidate.x, left_out
-            )
-        return scores[candidate.model]
-
+    predictions = _Predictions(measurements, folds(measurements) if larger else [])
     for candidate in larger:
         evidence = _bic_difference(current, candidate, best, measurements.size)
         needed = STRONG_BIC if candidate.x.size > current.x.size else TIE_BIC
         if evidence <= needed or _equivalent(current, candidate):
             continue
-        if not left_out or score(candidate) * _misfit(candidate) < score(current) * _misfit(
-            current
-        ):
+        if not predictions.left_out or predictions.better(candidate, current):
             current = candidate
     return current
+
+
+@dataclass(frozen=True, slots=True)
+class _Predictions:
+    """Errors of the candidates' predictions of points left out of the fit, each computed once.
+
+    left_out: masks (N,) of `folds`. known: by name of the model and the most points of a fit.
+    """
+
+    measurements: Measurements
+    left_out: list[BoolArray]
+    known: dict[tuple[str, int | None], float] = field(default_factory=dict)
+
+    def better(self, candidate: FitResult, current: FitResult) -> bool:
+        """True if one predicts and fits better than another: as the product of its residuals."""
+        ratio = self._ratio(candidate, current, FEW)
+        if 1 / _NEARLY_EQUAL < ratio < _NEARLY_EQUAL and self.measurements.size > FEW:
+            ratio = self._ratio(candidate, current, None)
+        return ratio < 1.0
+
+    def _ratio(self, candidate: FitResult, current: FitResult, most: int | None) -> float:
+        own, other = (self._error(one, most) * _misfit(one) for one in (candidate, current))
+        return own / other if other else math.inf
+
+    def _error(self, candidate: FitResult, most: int | None) -> float:
+        key = candidate.model, most
+        if key not in self.known:
+            self.known[key] = held_out_error(
+                self.measurements, candidate.problem, candidate.x, self.left_out, most
+            )
+        return self.known[key]
 
 
 def _misfit(result: FitResult) -> float:

@@ -99,13 +99,20 @@ def worst_stretches(m: Measurements, residuals: FloatArray, most: int = 3) -> li
     inside = np.concatenate([s.points for s in swept]) if swept else np.zeros(0, dtype=np.int64)
     outside = np.setdiff1d(np.arange(m.size), inside)
     single = [Sweep(float(m.theta_i_deg[k]), float(plane[k]), np.array([k])) for k in outside]
-    found = [
-        _stretch(sweep, part, m, views, residuals)
-        for sweep in (*swept, *single)
-        for part in _one_sided(sweep.points, residuals)
-    ]
-    found.sort(key=lambda stretch: -stretch.weight)
-    return [s for n, s in enumerate(found[:most]) if n == 0 or s.weight > _NOTABLE]
+    parts = [(s, part) for s in (*swept, *single) for part in _one_sided(s.points, residuals)]
+    weights = _weights(residuals, [part for _, part in parts])
+    worst = [parts[n] for n in np.argsort(-weights, kind="stable")[:most]]
+    found = [_stretch(sweep, points, m, views, residuals) for sweep, points in worst]
+    return [s for n, s in enumerate(found) if n == 0 or s.weight > _NOTABLE]
+
+
+def _weights(residuals: FloatArray, parts: list[IntArray]) -> FloatArray:
+    """Weight of each of P stretches (P,): its mean residual over that one's u."""
+    if not parts:
+        return np.zeros(0)
+    sizes = np.array([part.size for part in parts])
+    sums = np.add.reduceat(residuals[np.concatenate(parts)], np.cumsum(sizes) - sizes)
+    return np.asarray(np.abs(sums) / np.sqrt(sizes))
 
 
 def _one_sided(points: IntArray, residuals: FloatArray) -> list[IntArray]:

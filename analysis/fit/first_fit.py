@@ -19,7 +19,7 @@ from analysis.data.thinning import thinned
 from analysis.fit.criteria import bic, enough_chi2, variance_floor
 from analysis.fit.relative_scale import FACTOR_NAME, relative_model
 from analysis.fit.search.levenberg_marquardt import HUBER, Minimum
-from analysis.fit.search.minima import LOWER, all_minima
+from analysis.fit.search.minima import LOWER, all_minima, followed
 from analysis.fit.search.problem import Problem
 from analysis.fit.search.starting_values import MANY, Grid, Known
 from analysis.models import Model
@@ -37,13 +37,13 @@ _NEAR, _LOOKED_AT = 0.1, 3
 # A minimum of the part lies off that of all points by its own u: there chi2 is above the minimum by
 # about K / _PART of it. Those that are above the lowest by no more than this fraction are followed.
 _CLOSE = 0.02
-# They are followed until a step lowers chi2 by no more than this, in units of u^2: 0.03 u.
-_RISE = 1e-3
-# Of a rough fit: relative tolerance of chi2, and the most steps.
-_ROUGH_RTOL, _ROUGH_STEPS = 1e-2, 4
-LEFT = (
-    f"left after {_ROUGH_STEPS} steps of the search, as it is far behind on {_PART} of the points"
-)
+# They are followed until a step lowers chi2 by no more than this, in units of u^2: the step before
+# it ended within 0.1 u.
+_RISE = 0.01
+# chi2 of all points over that of the part, for each point, up to which the part stands for them;
+# relative tolerance and most steps with which a rough fit is followed otherwise.
+_AS_EXPECTED, _ROUGH_RTOL, _ROUGH_STEPS = 1.5, 1e-2, 4
+LEFT = f"fitted to {_PART} of the points only, on which it is far behind"
 """Message of a rough fit."""
 # Iterations in which a robust fit and its estimate of the noise converge.
 _ROBUST_ROUNDS = 3
@@ -75,12 +75,13 @@ class FirstFit:
 class FirstFits:
     """First fits to one set of measurements, each made once: models share their special cases.
 
-    made, grids: by name of the model. known: parts of the terms that the grids share. part: first
-    fits to a part of very many measurements, else None.
+    made, rough, grids: by name of the model. known: parts of the terms that the grids share. part:
+    first fits to a part of very many measurements, else None.
     """
 
     measurements: Measurements
     made: dict[str, FirstFit] = field(default_factory=dict)
+    rough: dict[str, FirstFit] = field(default_factory=dict)
     grids: dict[str, Grid] = field(default_factory=dict)
     known: Known = field(default_factory=dict)
     part: FirstFits | None = field(init=False, default=None)
@@ -97,15 +98,34 @@ class FirstFits:
         return self.made[model.name]
 
     def roughly(self, model: Model) -> FirstFit:
-        """Fit to the part of very many measurements, followed for a few steps with all of them."""
+        """Fit to the part of very many measurements, with the chi2 that it has of all of them.
+
+        That is above its least value by about K / _PART. Where it is much larger, as the part has
+        too few points where it counts, a few steps follow.
+        """
         if self.part is None or model.name in self.made:
             return self.of(model)
+        if model.name not in self.rough:
+            self.rough[model.name] = self._fit_roughly(model, self.part.of(model))
+        return self.rough[model.name]
+
+    def _fit_roughly(self, model: Model, in_part: FirstFit) -> FirstFit:
         problem = self._problem(model)
-        (start, *_) = _lowest(problem, self.part.of(model))
-        found = problem.solve(start, rtol=_ROUGH_RTOL, most_steps=_ROUGH_STEPS)
+        ((chi2, start), *_) = _lowest(problem, in_part)
+        found = Minimum(start, chi2, False, LEFT)
+        if found.chi2 > _highest_expected(problem, in_part):
+            steps = problem.solve(start, rtol=_ROUGH_RTOL, most_steps=_ROUGH_STEPS)
+            found = steps._replace(converged=False, message=LEFT)
         own = bic(self.measurements, problem, found)
-        found = found._replace(converged=False, message=LEFT)
         return FirstFit(model, problem, found, own, (found.x,), rough=True)
+
+    def polished(self, first: FirstFit) -> FirstFit:
+        """The fit with its minimum followed to the end."""
+        if self.part is None:
+            return first
+        own = self.of(first.model)
+        found = own.problem.solve(own.solution.x)
+        return replace(own, solution=found, bic=bic(self.measurements, own.problem, found))
 
     def _fit(self, model: Model) -> FirstFit:
         m, problem = self.measurements, self._problem(model)
@@ -128,9 +148,8 @@ class FirstFits:
         """Minima of a problem, the deepest first."""
         if self.part is not None:
             starts = _lowest(problem, self.part.of(model))
-            atol = _RISE * problem.chi2(starts[0]) / self.measurements.size
-            found = (problem.solve(x, atol=atol) for x in starts)
-            return sorted(found, key=lambda one: one.chi2)
+            atol = _RISE * starts[0][0] / self.measurements.size
+            return followed(problem, starts, atol)
         if model.name not in self.grids:
             self.grids[model.name] = Grid.of(problem, self.known)
         count = _MAX_STARTS if self.measurements.size < MANY else _STARTS_OF_MANY
@@ -160,15 +179,23 @@ def _near(one: FirstFit, other: FirstFit) -> bool:
     return one.solution.chi2 <= (1 + _NEAR) * other.solution.chi2
 
 
-def _lowest(problem: Problem, in_part: FirstFit) -> list[FloatArray]:
-    """Minima (K,) of the fit to a part whose chi2 is close to the lowest, the lowest first."""
+def _lowest(problem: Problem, in_part: FirstFit) -> list[tuple[float, FloatArray]]:
+    """Minima of the fit to a part with about the lowest chi2 of all points: chi2 and x (K,).
+
+    All are looked at where the part has no point in a lobe that is narrow there, and wrong.
+    """
     most = (1 + _NEAR) * in_part.solution.chi2
     starts = [x for x in in_part.starts[:_LOOKED_AT] if in_part.problem.chi2(x) <= most]
-    if len(starts) < 2:
-        return [in_part.solution.x]
-    chi2 = [problem.chi2(x) for x in starts]
-    order = sorted(range(len(starts)), key=lambda k: chi2[k])
-    return [starts[k] for k in order if chi2[k] <= (1 + _CLOSE) * chi2[order[0]]]
+    found = sorted(((problem.chi2(x), k) for k, x in enumerate(starts)))
+    if found[0][0] > _highest_expected(problem, in_part):
+        starts = list(in_part.starts)
+        found = sorted((problem.chi2(x), k) for k, x in enumerate(starts))
+    return [(chi2, starts[k]) for chi2, k in found if chi2 <= (1 + _CLOSE) * found[0][0]]
+
+
+def _highest_expected(problem: Problem, in_part: FirstFit) -> float:
+    """chi2 of all points up to which the part stands for them."""
+    return _AS_EXPECTED * in_part.solution.chi2 * problem.brdf.size / in_part.problem.brdf.size
 
 
 def first_fit(model: Model, measurements: Measurements, robust: bool = False) -> FirstFit:

@@ -31,7 +31,7 @@ from analysis.fit.criteria import (
 from analysis.fit.first_fit import FirstFit, FirstFits, huber_refit
 from analysis.fit.relative_scale import normalise_lamp_levels, unscaled_parameters
 from analysis.fit.scale_ratios import Ratio, scale_ratios
-from analysis.fit.search.levenberg_marquardt import Minimum
+from analysis.fit.search.levenberg_marquardt import Minimum, loss
 from analysis.fit.search.minima import all_minima, deepest
 from analysis.fit.search.problem import Problem
 from analysis.fit.uncertainty import Uncertainty, uncertainty, unknown
@@ -52,6 +52,9 @@ _FAR_CHI2 = 25.0
 # Relative u of a shared error that may move the first fit, which does not know it, so far that the
 # covariance has to be linearised around a second one before a model is found to be far.
 _LARGE_SHARED = 0.01
+
+OfParameters = Literal["profiled", "none"]
+"""Uncertainty of a fit's parameters: with the intervals of those that have no u, or none yet."""
 
 NOT_CONVERGED = "the averaging over lamp and lens did not converge"
 
@@ -142,14 +145,14 @@ def refine(
     measurements: Measurements,
     acceptance: Acceptance | None,
     robust: bool = False,
-    profiles: bool = True,
+    u: OfParameters = "profiled",
 ) -> FitResult:
     """Refit with all uncertainties, shared ones included, and averaged where that matters.
 
     `first` is the model's fit to the measurements with independent uncertainties. The result is
     that of `fit`, whatever other models are compared: averaging is left out where it hardly matters
-    beside the model's own misfit. Without `profiles`, and for a model far from the data, the
-    interval of a parameter without u is its whole domain. A rough fit stays as it is, without u.
+    beside the model's own misfit. `u`: of the parameters; for a model far from the data, the
+    interval of one without u is its whole domain. A rough fit stays as it is, without u.
     """
     m = measurements
     if first.rough:
@@ -166,7 +169,17 @@ def refine(
     fitted = _averaged(linear, m, acceptance)
     if m.u_random is not None and _rejected(fitted):
         fitted = _widened(linear, fitted, m, acceptance)
-    return _result(m, fitted, linear.problem.covariance, "profiles" if profiles else "linear")
+    return _result(m, fitted, linear.problem.covariance, u)
+
+
+def with_linear_u(result: FitResult, m: Measurements) -> FitResult:
+    """The result, made without u, with that of its parameters where it is valid, no intervals."""
+    problem = result.solved
+    found = Minimum(result.x, problem.chi2(result.x), result.converged, result.message)
+    noise = noise_variance(m, problem, found)
+    known, ratios = _known(m, problem, found, noise, profiles=False)
+    ratios = {name: ratio for name, ratio in ratios.items() if ratio.u is not None}
+    return replace(result, u=known.u, correlation=known.correlation, ratios=ratios)
 
 
 class _Linearised(NamedTuple):
@@ -225,6 +238,8 @@ def _widened(
 ) -> AveragedFit:
     """Refit with the misfit as independent noise: its variance grows until chi2 is as expected."""
     stated = linear.problem.covariance
+    if acceptance is None and linear.problem.huber is None and not stated.common.shape[1]:
+        return _with_less_weight(linear)
     factor = 1.0
     for _ in range(_ROUNDS_OF_WIDENING):
         chi2, dof = _misfit(fitted)
@@ -238,6 +253,15 @@ def _widened(
         if chi2 < _WIDE_ENOUGH * dof:
             break
     return fitted
+
+
+def _with_less_weight(linear: _Linearised) -> AveragedFit:
+    """The fit with the misfit as noise where all errors are independent: its minimum stays."""
+    problem, found, _ = linear
+    factor = reduced_chi2(problem, found)
+    wider = replace(problem.covariance, variance=problem.covariance.variance * factor)
+    found = found._replace(chi2=found.chi2 / factor)
+    return AveragedFit(replace(problem, covariance=wider), found, averaged=False, converged=True)
 
 
 def _with_noise(first: FirstFit, m: Measurements) -> Measurements:
@@ -277,19 +301,19 @@ def _result(
     m: Measurements,
     fitted: AveragedFit,
     covariance: Covariance,
-    intervals: Literal["profiles", "linear", "none"],
+    u: OfParameters,
 ) -> FitResult:
     """Result with chi2 and u_total by the stated `covariance`, and u with the misfit as noise."""
     problem, found = replace(fitted.problem, covariance=covariance), fitted.solution
     x = found.x
     noise = noise_variance(m, fitted.problem, found)
-    found = found._replace(chi2=problem.chi2(x))
-    near = m.u_random is None or reduced_chi2(problem, found) < _FAR_CHI2
-    known, ratios = unknown(problem), dict[str, Ratio]()
-    if intervals != "none":
-        known, ratios = _known(m, fitted, noise, profiles=intervals == "profiles" and near)
     predicted = problem.predict(x)
     residual = m.brdf - predicted
+    found = found._replace(chi2=loss(covariance.whiten(residual), problem.huber))
+    near = m.u_random is None or reduced_chi2(problem, found) < _FAR_CHI2
+    known, ratios = unknown(problem), dict[str, Ratio]()
+    if u == "profiled":
+        known, ratios = _known(m, fitted.problem, fitted.solution, noise, profiles=near)
     scale = math.sqrt(noise) if m.u_random is None and problem.huber is None else 1.0
     pulls = covariance.pulls(residual)
     own = residual - covariance.common @ pulls
@@ -332,10 +356,9 @@ def _result(
 
 
 def _known(
-    m: Measurements, fitted: AveragedFit, noise: float, *, profiles: bool
+    m: Measurements, problem: Problem, found: Minimum, noise: float, *, profiles: bool
 ) -> tuple[Uncertainty, dict[str, Ratio]]:
     """Uncertainties of the parameters and of the ratios of scales."""
-    problem, found = fitted.problem, fitted.solution
     unscaled = unscaled_parameters(problem.model) if m.relative else frozenset[str]()
     ratios = scale_ratios(problem, found, noise, profiles=profiles)
     return uncertainty(problem, found, noise, unscaled, profiles), ratios

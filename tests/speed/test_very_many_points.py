@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from analysis.choice.choice import Choice, choose
+from analysis.choice.ladder import functional_form
 from analysis.data.measurements import Measurements
 from analysis.fit import first_fit
 from analysis.models import MODELS
@@ -23,6 +24,7 @@ MATERIALS = ("oren_nayar", "oren_nayar+torrance_sparrow", "lambert+ggx", "minnae
 # chi2 of a model that is hopeless, over its least; and over that of the best model, from which on
 # its value does not matter.
 MOST_ABOVE, OUT_OF_QUESTION = 1.2, 100.0
+DEEPER = 0.999  # chi2 of a deeper minimum, as a fraction of that which the other search found
 BOUNDED = (1, 4)  # seeds
 FACTOR = 8  # of the number of points, from the program's limits to those of the bounded form
 
@@ -74,6 +76,7 @@ def test_the_choice_is_that_of_a_search_with_all_points(
     monkeypatch: pytest.MonkeyPatch,
     record_property: Callable[[str, object], None],
 ) -> None:
+    """Unless the quick search finds a deeper minimum of a model: then its choice is the better."""
     very_many, part = first_fit._VERY_MANY, first_fit._PART
     if not slow and seed not in BOUNDED:
         pytest.skip("with --slow")
@@ -82,17 +85,24 @@ def test_the_choice_is_that_of_a_search_with_all_points(
     found = compared(drawn(seed, 2 * very_many), very_many, part, monkeypatch)
     record_property("time of the search with all points", found.whole_s / found.quick_s)
     quick, whole = found.quick, found.whole
-    assert (quick.chosen, quick.verdict) == (whole.chosen, whole.verdict)
     assert quick.best is not None
     assert whole.best is not None
-    for name, u in whole.best.u.items():
-        if u is not None:
-            assert abs(quick.best.values[name] - whole.best.values[name]) < 0.1 * u, name
+    shown = {c.model: c.chi2 or 0.0 for c in quick.candidates}
+    # An integrated model may be left out by one search as no more accurate than its form.
+    both = [c for c in whole.candidates if c.model in shown or not functional_form(c.model)]
+    deeper = [c for c in both if shown[c.model] < DEEPER * (c.chi2 or 0.0)]
+    assert quick.verdict == whole.verdict
+    if deeper:
+        assert quick.best.bic <= whole.best.bic
+    else:
+        assert quick.chosen == whole.chosen
+        for name, u in whole.best.u.items():
+            if u is not None:
+                assert abs(quick.best.values[name] - whole.best.values[name]) < 0.1 * u, name
     assert all(c.converged or c.message == first_fit.LEFT for c in quick.candidates)
     assert any(c.message == first_fit.LEFT for c in quick.candidates)
-    shown = {c.model: c.chi2 or 0.0 for c in quick.candidates}
     least = min(c.chi2 or 0.0 for c in whole.candidates)
-    for one in whole.candidates:
+    for one in both:
         assert one.chi2 is not None
         if one.chi2 < OUT_OF_QUESTION * least:
             assert shown[one.model] < MOST_ABOVE * one.chi2, one.model

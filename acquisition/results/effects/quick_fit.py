@@ -91,7 +91,7 @@ def _better_fit(m: Measurements) -> QuickFit:
     fits = FirstFits(m)
     firsts = [fits.of(MODELS[f"{_BODY}+{lobe}"]) for lobe in _LOBES]
     if m.free_levels:
-        full = min((refine(f, m, None, profiles=False) for f in firsts), key=lambda one: one.bic)
+        full = min((refine(f, m, None, u="none") for f in firsts), key=lambda one: one.bic)
         return QuickFit(full.problem, full.x)
     best = min(firsts, key=lambda one: one.bic)
     return QuickFit(best.problem, best.solution.x)

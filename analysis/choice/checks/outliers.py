@@ -87,9 +87,7 @@ def outliers(
     few = others.size < _POINTS_PER_PARAMETER * robust.solution.x.size
     if few or _systematic(robust, m, out):
         return None
-    fitted = refine(
-        FirstFits(others).of(robust.model), others, acceptance, robust=False, profiles=False
-    )
+    fitted = refine(FirstFits(others).of(robust.model), others, acceptance, u="none")
     if not _explains(fitted, others, usual):
         return None
     predicted = robust.problem.predict(robust.solution.x)

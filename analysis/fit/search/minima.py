@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from analysis.fit.search.levenberg_marquardt import Minimum
+from analysis.fit.search.levenberg_marquardt import MAX_STEPS, Minimum
 from analysis.fit.search.problem import Problem
 from analysis.fit.search.starting_values import MANY, values_between
 from instrument.geometry import FloatArray
@@ -37,6 +37,9 @@ _NEARLY = 2.0
 # Distance to either side of a minimum at which chi2 is looked at, in u, and the factor by which its
 # rise there may differ from that of a parabola; least curvature, relative to the largest.
 _FAR_U, _BENT, _FLAT = 3.0, 2.0, 1e-12
+# Steps after which a start close to a minimum is seen to lead to one found before, and the distance
+# from that, as a fraction of the domain.
+_FEW_STEPS, _NEARBY = 3, 0.01
 # Relative decrease of chi2 from which another point counts as lower.
 LOWER = 1e-9
 
@@ -80,6 +83,38 @@ def _rough_minima(problem: Problem, starts: Sequence[FloatArray], enough: float)
 def _rough_minimum(problem: Problem, start: FloatArray, atol: float = 0.0) -> Minimum:
     x = _levelled(problem, start)
     return problem.solve(x, atol=atol, rtol=_QUICK_RTOL, most_steps=_QUICK_STEPS)
+
+
+def followed(
+    problem: Problem, starts: Iterable[tuple[float, FloatArray]], atol: float
+) -> list[Minimum]:
+    """Minima from starts close to them, the deepest first; `atol` is in units of u^2.
+
+    starts: chi2, in units of u^2, and x (K,), in the model's units, the lowest first. One beside
+    another before it is left out, and one that a few steps lead to a minimum found before is
+    followed no further.
+    """
+    found: list[Minimum] = []
+    begun: list[Minimum] = []
+    for chi2, start in starts:
+        begun.append(Minimum(start, chi2, False, ""))
+        if any(_alike(problem, begun[-1], other) for other in begun[:-1]):
+            continue
+        one = problem.solve(start, atol=atol, most_steps=_FEW_STEPS if found else MAX_STEPS)
+        if any(_alike(problem, one, other) for other in found):
+            continue
+        if not one.converged:
+            one = problem.solve(one.x, atol=atol)
+        found.append(one)
+    return sorted(found, key=_depth)
+
+
+def _alike(problem: Problem, one: Minimum, other: Minimum) -> bool:
+    """True if one lies beside the other, hardly above it."""
+    near = _NEARBY * (problem.high - problem.low)
+    higher = one.chi2 - other.chi2
+    beside = bool(np.all(np.abs(one.x - other.x) <= near))
+    return beside and 0 <= higher <= _ALIKE * other.chi2
 
 
 def _across_the_valley(problem: Problem, found: Minimum) -> Minimum:

@@ -28,7 +28,7 @@ DARK = 1e-15  # mean value in 1/sr: no light
 def found(m: Measurements, *names: str) -> Outliers | None:
     fits = FirstFits(m)
     first = [fits.of(MODELS[name]) for name in names]
-    usual = refine(first[-1], m, None, profiles=False)
+    usual = refine(first[-1], m, None, u="none")
     return outliers(first, m, None, usual)
 
 
