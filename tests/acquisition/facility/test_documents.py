@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import warnings
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 
@@ -103,9 +105,19 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
         warnings.simplefilter("ignore")  # of the libraries of that server
         from tiled.server import SimpleTiledServer
 
-        started = SimpleTiledServer(tmp_path_factory.mktemp("tiled"))
+        with patch("subprocess.run", _tiled_here):
+            started = SimpleTiledServer(tmp_path_factory.mktemp("tiled"))
         yield started
         started.close()
+
+
+def _tiled_here(command: list[str], **_: object) -> subprocess.CompletedProcess[bytes]:
+    """Run `python -m tiled ...` in this process, which has imported Tiled already."""
+    from tiled.commandline.main import cli_app
+
+    assert command[1:3] == ["-m", "tiled"]
+    cli_app(command[3:], standalone_mode=False)
+    return subprocess.CompletedProcess(command, 0, b"", b"")
 
 
 @pytest.mark.filterwarnings("ignore")  # of the server's libraries and of its client's

@@ -1,7 +1,8 @@
 """Dask cluster of a few worker processes, in a process of its own: its loop belongs to no test.
 
 `python -m tests.support.batch.local_cluster WORKERS` prints the address of its scheduler and
-runs until its standard input ends.
+runs until its standard input ends. Workers are forks of a process that has imported Dask, and an
+item is lost with its second worker: the tests end many of them.
 """
 
 from __future__ import annotations
@@ -12,6 +13,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from tests.support.paths import ROOT
+
+_QUICK = {
+    "distributed.worker.multiprocessing-method": "forkserver",
+    "distributed.scheduler.allowed-failures": 1,
+}
 
 
 @contextmanager
@@ -30,8 +36,10 @@ def local_cluster(workers: int = 2) -> Iterator[str]:
 
 def main() -> None:
     """Run the cluster."""
+    import dask
     from distributed import LocalCluster
 
+    dask.config.set(_QUICK)
     with LocalCluster(
         n_workers=int(sys.argv[1]), threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:

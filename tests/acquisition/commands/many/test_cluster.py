@@ -21,7 +21,7 @@ from instrument.errors import InputError
 from tests.support.batch.local_cluster import local_cluster
 from tests.support.batch.tables import MODELS, write_tables
 from tests.support.batch.work import Item, attempts, squared
-from tests.support.command import gonio, gonio_here
+from tests.support.command import gonio_here
 from tests.support.paths import ROOT
 from tests.support.timing.deadline import wait_for
 
@@ -42,7 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_results_are_those_of_each_source_alone_bit_for_bit(folder: Path, scheduler: str) -> None:
     """One bad file, and one that determines nothing, among them."""
     models = ("--models", MODELS, "--json")
-    done = gonio("fit", "--all", folder, *models, "--scheduler", scheduler)
+    done = gonio_here("fit", "--all", folder, *models, "--scheduler", scheduler)
     assert done.returncode == 2, done.stderr
     found = json.loads(done.stdout)
     assert found["complete"]
@@ -117,7 +117,7 @@ def _opened(pipe: Path) -> bool:
 
 
 def test_an_address_that_is_none_is_refused(folder: Path) -> None:
-    done = gonio("fit", "--all", folder, "--scheduler", "tcp://127.0.0.1:word")
+    done = gonio_here("fit", "--all", folder, "--scheduler", "tcp://127.0.0.1:word")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("--scheduler tcp://127.0.0.1:word: no Dask scheduler answers")
     assert len(done.stderr.splitlines()) == 1
