@@ -11,6 +11,7 @@ import pytest
 from instrument.config.load import load_protocol
 from tests.support.command import gonio_here
 from tests.support.paths import CONFIGS, ROOT
+from tests.support.scans import small_rig
 
 README = (ROOT / "README.md").read_text()
 
@@ -25,9 +26,12 @@ def _blocks(language: str, text: str = README) -> list[str]:
 def _configs(folder: Path) -> None:
     """Copy the rigs and protocols; those that run have short scans of simple surfaces.
 
-    The commands and examples prove no more with whole scans; `test_samples` has these.
+    And a quarter of the pixels. The commands and examples prove no more with whole scans;
+    `test_samples` has these.
     """
     shutil.copytree(CONFIGS, folder / "configs")
+    rigs = folder / "configs" / "rigs"
+    small_rig(rigs, shrink=2).replace(rigs / "bench_12bit.yaml")
     for name in ("plaster_a", "demo"):
         path = folder / "configs" / "protocols" / f"{name}.yaml"
         text = path.read_text().replace("[30.0, 45.0, 60.0]", "[30.0, 60.0]")

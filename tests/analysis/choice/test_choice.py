@@ -30,6 +30,11 @@ def numbered(samples: Sequence[tuple[float, ...]]) -> list[tuple[float, ...]]:
     return [(number, *sample) for number, sample in enumerate(samples)]
 
 
+def candidates(every: bool, name: str = GLOSS) -> Sequence[str] | None:
+    """Return every candidate (None), or few, among them the sample's own."""
+    return None if every else [*FEW, *({name} - {*FEW})]
+
+
 def note(choice: Choice, code: NoteCode) -> str:
     """Text of the notes with that code."""
     return "; ".join(n.text for n in choice.notes if n.code == code)
@@ -45,11 +50,14 @@ def scans_of(number: int, slow: bool) -> Iterator[tuple[int, bool]]:
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "sigma", "albedo"), numbered(DIFFUSE))
 def test_diffuse_samples(number: int, sigma: float, albedo: float, slow: bool) -> None:
-    """Seen by a lens and a patch without extent, and averaged over both."""
+    """Seen by a lens and a patch without extent, and averaged over both.
+
+    Without --slow one sample has all candidates, as one of each test below.
+    """
     for seed, averaged in scans_of(number, slow):
         acceptance = RIG if averaged else None
         m = scan("oren_nayar", seed, acceptance=acceptance, albedo=albedo, sigma_deg=sigma)
-        found = choose(m, acceptance)
+        found = choose(m, acceptance, candidates(slow or not number))
         assert (found.chosen, found.verdict) == ("oren_nayar", "adequate"), found.reason
 
 
@@ -59,7 +67,7 @@ def test_glossy_samples(number: int, sigma: float, albedo: float, ks: float, slo
     for seed, averaged in scans_of(number + 1, slow):
         acceptance = RIG if averaged else None
         m = scan(GLOSS, seed, acceptance=acceptance, albedo=albedo, sigma_deg=sigma, ks=ks)
-        found = choose(m, acceptance)
+        found = choose(m, acceptance, candidates(slow or not number))
         assert (found.chosen, found.verdict) == (GLOSS, "adequate"), found.reason
 
 
@@ -76,14 +84,17 @@ def test_glossy_samples(number: int, sigma: float, albedo: float, ks: float, slo
 def test_other_samples(number: int, name: str, truth: dict[str, float], slow: bool) -> None:
     """With a tile known exactly, and to 0.5 %."""
     for seed, tile in scans_of(number, slow):
-        found = choose(scan(name, seed, u_tile=0.005 if tile else 0.0, **truth))
+        m = scan(name, seed, u_tile=0.005 if tile else 0.0, **truth)
+        found = choose(m, models=candidates(slow or name == "lambert", name))
         assert (found.chosen, found.verdict) == (name, "adequate"), found.reason
 
 
-def test_a_small_unknown_error_makes_no_lobe() -> None:
+@pytest.mark.slow
+def test_a_small_unknown_error_makes_no_lobe(slow: bool) -> None:
     m = scan("oren_nayar", 1, albedo=0.9, sigma_deg=30)
     for error in (np.cos(2 * np.radians(m.theta_r_deg)), m.theta_r_deg / 80, m.theta_r_deg > 0):
-        found = choose(replace(m, brdf=m.brdf * (1 + 5e-4 * error)))  # as large as the noise
+        disturbed = replace(m, brdf=m.brdf * (1 + 5e-4 * error))  # as large as the noise
+        found = choose(disturbed, models=candidates(slow))
         assert found.chosen == "oren_nayar", found.reason
 
 
@@ -106,22 +117,26 @@ def test_not_identifiable() -> None:
     assert entry["interval"] == [0.5, 60.0]
 
 
-def test_without_stated_u() -> None:
+@pytest.mark.slow
+def test_without_stated_u(slow: bool) -> None:
     m = scan(GLOSS, 1, albedo=0.75, sigma_deg=42, ks=0.34)
-    found = choose(Measurements.bare(m.theta_i_deg, m.theta_r_deg, m.dphi_deg, m.brdf))
+    bare = Measurements.bare(m.theta_i_deg, m.theta_r_deg, m.dphi_deg, m.brdf)
+    found = choose(bare, models=candidates(slow))
     assert (found.chosen, found.verdict) == (GLOSS, "adequate")
     rng = np.random.default_rng(0)
     wild = Measurements.bare(m.theta_i_deg, m.theta_r_deg, 0.0, rng.uniform(0.05, 0.3, m.size))
     assert choose(wild, models=FEW).verdict == "none adequate"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["lambert", "oren_nayar_qualitative", "oren_nayar", GLOSS])
-def test_data_without_noise(name: str) -> None:
+def test_data_without_noise(name: str, slow: bool) -> None:
     truth = {p.name: 0.3 if p.name == "ks" else p.default for p in MODELS[name].parameters}
     theta_i, theta_r, dphi = scan_angles()
     geometry = Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
     value = MODELS[name].brdf(geometry, **truth)
-    found = choose(Measurements.bare(theta_i, theta_r, dphi, value))
+    m = Measurements.bare(theta_i, theta_r, dphi, value)
+    found = choose(m, models=candidates(slow or name == GLOSS, name))
     assert (found.chosen, found.verdict) == (name, "adequate")
     best = next(c for c in found.candidates if c.model == name)
     assert dict(best.values) == pytest.approx(truth, rel=1e-4)

@@ -52,7 +52,7 @@ STEPS = [
     ),
 ]
 
-BOUNDED, FEW = 0.02, 0.006  # fractions of the scans and of the choices that `make test` runs
+BOUNDED, FEW = 0.01, 0.004  # fractions of the scans and of the choices that `make test` runs
 
 
 def test_the_lobe_of_a_matte_sample_is_not_determined() -> None:

@@ -18,17 +18,27 @@ from instrument.config.protocol import Steps
 from instrument.devices import Camera, Frame
 from instrument.record.record import Record
 from tests.support.benchmark import FEW, trial_of
-from tests.support.scans import changed
+from tests.support.scans import changed, shrunk
 from tests.support.stand_ins import PassThrough
 
 
 @pytest.fixture
 def few_points(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The demonstration with one incidence, every 8 degrees: a fifth of its points."""
-    shipped = demo_scan.shipped_demo()
+    """The demonstration with one incidence, every 8 degrees: a fifth of its points.
+
+    And a quarter of its pixels, of an even sample: coarse pixels would cut mottling at the edge.
+    """
+    shipped = shrunk(demo_scan.shipped_demo(), 2)
+    sample, window = shipped.protocol.simulated_sample, shipped.protocol.window
+    assert sample is not None
     views = Steps(start=-80.0, stop=80.0, num=21)
     sweep = {**shipped.protocol.sweeps[0], "theta_i_deg": [45.0], "theta_r_deg": views}
-    smaller = changed(shipped, sweeps=[sweep])
+    smaller = changed(
+        shipped,
+        sweeps=[sweep],
+        simulated_sample=sample.model_copy(update={"mottling": 0.0}),
+        window=window.model_copy(update={"min_pixels": window.min_pixels // 4}),
+    )
     monkeypatch.setattr(demo_scan, "shipped_demo", lambda: smaller)
 
 

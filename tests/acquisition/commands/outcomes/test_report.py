@@ -18,8 +18,11 @@ pytestmark = pytest.mark.charts
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Its report has no charts: they are drawn when it is printed."""
     folder = tmp_path_factory.mktemp("printed")
-    return finished_run(small_demo(folder, TWO_MODELS), folder / "run")
+    with pytest.MonkeyPatch.context() as patched:
+        leave_charts_out(patched)
+        return finished_run(small_demo(folder, TWO_MODELS), folder / "run")
 
 
 @pytest.mark.skipif(not any(map(shutil.which, BROWSERS)), reason="no Chromium: install chromium")

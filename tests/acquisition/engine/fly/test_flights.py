@@ -101,7 +101,7 @@ def test_the_latency_is_found_and_recorded(flown: Loaded, tmp_path: Path) -> Non
 def test_a_lobe_2_degrees_wide_is_unbiased_within_u(tmp_path: Path, slow: bool) -> None:
     """The light of each frame against that at rest at its angle, in units of u without the lamp."""
     chosen, pulls, peaks = np.random.default_rng(5), [], []
-    for number in range(20 if slow else 2):
+    for number in range(20 if slow else 1):
         loaded = narrow_lobe_scan(chosen)
         with Record.create(tmp_path / str(number), {}) as record:
             scan(loaded, record)
