@@ -31,6 +31,16 @@ RigFile = Annotated[
 
 RunFolder = Annotated[Path, typer.Argument(help="The folder of a run.")]
 
+Workers = Annotated[
+    int | None,
+    typer.Option(min=1, help="Processes for --all. Default: as many as there are cores."),
+]
+
+Scheduler = Annotated[
+    str | None,
+    typer.Option(help="Dask scheduler for --all in place of processes, as tcp://127.0.0.1:8786."),
+]
+
 RigOnly = Annotated[Path | None, typer.Option("--rig", help="The rig file.")]
 
 
@@ -44,6 +54,13 @@ def model_names(incomplete: str) -> list[str]:
     from acquisition.commands.models import completed_names
 
     return completed_names(incomplete)
+
+
+def refuse_without_all(workers: int | None, scheduler: str | None) -> None:
+    """Raise `InputError` for an option of --all where that is not given."""
+    for option, value in (("--workers", workers), ("--scheduler", scheduler)):
+        if value is not None:
+            raise InputError(f"{option}: for many sources at once; allowed with --all")
 
 
 class Commands(TyperGroup):

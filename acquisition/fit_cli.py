@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from acquisition.cli_parts import Json, among, model_names
+from acquisition.cli_parts import (
+    Json,
+    Scheduler,
+    Workers,
+    among,
+    model_names,
+    refuse_without_all,
+)
 from instrument.errors import InputError
 
 
@@ -81,16 +88,8 @@ def fit(
     all: Annotated[
         bool, typer.Option("--all", help="Fit every run and table in a folder and its folders.")
     ] = False,
-    workers: Annotated[
-        int | None,
-        typer.Option(min=1, help="Processes for --all. Default: as many as there are cores."),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            help="Dask scheduler for --all in place of processes, as tcp://127.0.0.1:8786."
-        ),
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     json: Json = False,
 ) -> None:
     """Find the simplest model that explains a run or a table of BRDF.
@@ -116,15 +115,13 @@ def fit(
     )
     asked = Asked(wanted=wanted, models=models, robust=robust, method=method)
     if all:
-        from acquisition.commands.many.fit_all import Many, fit_all
+        from acquisition.commands.many.each_source import Many
+        from acquisition.commands.many.fit_all import fit_all
 
         _refuse_for_all(format, sample)
-        many = Many(workers=workers, scheduler=scheduler, out=out, as_json=json)
-        fit_all(source, asked, many)
+        fit_all(source, asked, Many(workers=workers, scheduler=scheduler, as_json=json), out)
         return
-    if workers is not None or scheduler is not None:
-        option = "--workers" if scheduler is None else "--scheduler"
-        raise InputError(f"{option}: one source is fitted by one process; allowed with --all")
+    refuse_without_all(workers, scheduler)
     fit_source(source, asked, folder=out, as_json=json)
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from acquisition.cli_parts import Json, RunFolder
+from acquisition.cli_parts import Json, RunFolder, Scheduler, Workers, refuse_without_all
 
 
 def _format_names(incomplete: str) -> list[str]:
@@ -75,7 +75,9 @@ def runs(
 
 
 def map_(
-    folder: RunFolder,
+    folder: Annotated[
+        Path, typer.Argument(help="The folder of a run; with --all, a folder of runs.")
+    ],
     cell_mm: Annotated[
         float | None,
         typer.Option(help="Side of a cell in mm. Default: 0.5, or a pixel where that is larger."),
@@ -88,15 +90,30 @@ def map_(
         ),
     ] = None,
     nexus: Annotated[bool, typer.Option("--nexus", help="Write map.nxs, too (h5py).")] = False,
+    all: Annotated[
+        bool,
+        typer.Option("--all", help="Map every run with frames or cells in a folder and below."),
+    ] = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     json: Json = False,
 ) -> None:
     """Map albedo and roughness over the sample of a run that kept its frames.
 
     Writes map.npz and map.html into the run's folder, and tells whether the sample is uniform.
+    With --all, a run that fails does not end the others; the exit code is that of the worst.
     """
-    from acquisition.commands.outcomes.map import map_run
+    from acquisition.commands.outcomes.map import Asked, map_run
 
-    map_run(folder, cell_mm, model, nexus=nexus, as_json=json)
+    asked = Asked(cell_mm=cell_mm, model=model, nexus=nexus)
+    if all:
+        from acquisition.commands.many.each_source import Many
+        from acquisition.commands.many.map_all import map_all
+
+        map_all(folder, asked, Many(workers=workers, scheduler=scheduler, as_json=json))
+        return
+    refuse_without_all(workers, scheduler)
+    map_run(folder, asked, as_json=json)
 
 
 def show(

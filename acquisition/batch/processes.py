@@ -27,7 +27,7 @@ Result = TypeVar("Result")
 _OF_TERMINAL = (signal.SIGINT, signal.SIGQUIT, signal.SIGHUP)  # reach all processes of a terminal
 _TWICE = (
     "its process was ended from outside twice, as a system short of memory does: free memory, or "
-    "give it to fewer fits at a time, as with --workers 1"
+    "have fewer sources worked on at a time, as with --workers 1"
 )
 
 

@@ -1,9 +1,7 @@
-"""Outcomes of many fits, and their table: a row for each source."""
+"""Outcomes of a command for many sources, and their JSON."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,36 +9,28 @@ from typing import Any
 from instrument.errors import GonioError
 
 _WORST_FIRST = (1, 3, 2, 5)  # exit codes: a fault of the program, a disk, the input, the data
-_FIRST = ("source", "exit_code", "chosen", "verdict", "rms_relative", "reduced_chi2")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """Outcome of the fit of one source.
+    """Outcome of a command for one source.
 
-    exit_code, message: of `gonio fit` of the source alone, 0 and empty where all is well. fit: as
-    in fit.json, None where nothing was read. files: content by name, for a folder.
+    exit_code: of the command for the source alone. message: of its failure, or a note on its
+    result. result: what --json prints for the source alone, None where nothing was read. files:
+    content by name, until they are written.
     """
 
     source: str
     exit_code: int = 0
     message: str = ""
-    fit: Mapping[str, Any] | None = None
-    files: Mapping[str, str] = field(default_factory=dict)
+    result: Mapping[str, Any] | None = None
+    files: Mapping[str, str | bytes] = field(default_factory=dict)
 
     @property
     def reason(self) -> str:
-        """Reason of a failure in one line."""
+        """Message in one line."""
         first, *more = self.message.splitlines() or [""]
         return f"{first} (and {len(more)} more)" if more else first
-
-    @property
-    def chosen(self) -> Mapping[str, Any] | None:
-        """Candidate that was chosen, as in fit.json."""
-        if self.fit is None:
-            return None
-        name = self.fit["chosen"]
-        return next((c for c in self.fit["candidates"] if c["model"] == name), None)
 
 
 class SomeFailed(GonioError):
@@ -54,33 +44,13 @@ class SomeFailed(GonioError):
         self.exit_code = next(code for code in _WORST_FIRST if code in codes)
 
 
-def as_json(outcomes: Sequence[Outcome], *, complete: bool) -> dict[str, Any]:
-    """Content of the output of --json; `complete`: no source is left out."""
+def as_json(outcomes: Sequence[Outcome], result: str, *, complete: bool) -> dict[str, Any]:
+    """Content of the output of --json; result: name of a source's result, such as "fit".
+
+    `complete`: no source is left out.
+    """
     rows = [
-        {"source": o.source, "exit_code": o.exit_code, "message": o.message, "fit": o.fit}
+        {"source": o.source, "exit_code": o.exit_code, "message": o.message, result: o.result}
         for o in outcomes
     ]
     return {"complete": complete, "results": rows}
-
-
-def as_csv(outcomes: Sequence[Outcome]) -> str:
-    """Table with the parameters of the chosen models, each with its u; empty: not known."""
-    names = sorted({name for o in outcomes for name in (o.chosen or {}).get("parameters", {})})
-    of_names = [title for name in names for title in (name, f"u_{name}")]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*_FIRST, *of_names, "message"])
-    for o in outcomes:
-        writer.writerow([*_first(o), *_parameters(o, names), o.reason])
-    return text.getvalue()
-
-
-def _first(o: Outcome) -> list[Any]:
-    fit, chosen = o.fit or {}, o.chosen or {}
-    found = [chosen.get("rms_relative"), chosen.get("reduced_chi2")]
-    return [o.source, o.exit_code, fit.get("chosen"), fit.get("verdict"), *found]
-
-
-def _parameters(o: Outcome, names: Sequence[str]) -> list[Any]:
-    parameters = (o.chosen or {}).get("parameters", {})
-    return [parameters.get(name, {}).get(key) for name in names for key in ("value", "u")]

@@ -26,17 +26,24 @@ def npz_bytes(found: SampleMap) -> bytes:
     return file.getvalue()
 
 
+def require_nexus() -> None:
+    """Raise `InputError` where the library h5py is not installed."""
+    try:
+        import h5py  # noqa: F401 - whether it can be imported
+    except ImportError as error:
+        raise InputError(
+            "--nexus needs h5py, which this Python does not have: pip install 'gonio[nexus]'"
+        ) from error
+
+
 def nexus_bytes(found: SampleMap) -> bytes:
     """Return the content of a NeXus file: an NXdata for each parameter, with its u as errors.
 
     Raises `InputError` where the library h5py is not installed.
     """
-    try:
-        import h5py
-    except ImportError as error:
-        raise InputError(
-            "--nexus needs h5py, which this Python does not have: pip install 'gonio[nexus]'"
-        ) from error
+    require_nexus()
+    import h5py
+
     with h5py.File("map.nxs", "w", driver="core", backing_store=False) as file:
         file.attrs.update({"NX_class": "NXroot", "default": "entry", "creator": "gonio"})
         _write_entry(file, found)

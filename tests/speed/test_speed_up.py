@@ -60,9 +60,9 @@ def test_fits_that_depend_on_the_number_of_processes_end_the_benchmark(
     ) -> Iterator[tuple[tuple[str, Path], Outcome]]:
         for item in items:
             outcome = work(item)
-            assert outcome.fit is not None
-            fit = outcome.fit if equal else {**outcome.fit, "reason": str(workers)}
-            yield item, replace(outcome, fit=fit)
+            assert outcome.result is not None
+            fit = outcome.result if equal else {**outcome.result, "reason": str(workers)}
+            yield item, replace(outcome, result=fit)
 
     asked = Asked(wanted=Wanted(), models="lambert,oren_nayar_qualitative")
     monkeypatch.setattr(module, "on_processes", one_by_one)

@@ -53,10 +53,11 @@ def test_scan_and_fit_import_no_library_that_most_runs_do_not_need() -> None:
     assert not heavy & _loaded_by(f"{needed}, {driven}")
 
 
-def test_neither_scan_nor_fits_import_the_cluster() -> None:
-    """Dask is for `gonio fit --all --scheduler`, and imported once that is called."""
+def test_neither_scan_nor_fits_nor_maps_import_the_cluster() -> None:
+    """Dask is for `--all --scheduler`, and imported once that is called."""
     needed = (
-        "acquisition.commands.scan, acquisition.commands.fit, acquisition.commands.many.fit_all"
+        "acquisition.commands.scan, acquisition.commands.fit, acquisition.commands.many.fit_all, "
+        "acquisition.commands.many.map_all"
     )
     assert not {"dask", "distributed", "tornado"} & _loaded_by(needed)
 

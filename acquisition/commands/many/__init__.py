@@ -1,1 +1,1 @@
-"""Commands on all sources of a folder; open `fit_all.py` first."""
+"""Commands on all sources of a folder; open `each_source.py` first."""

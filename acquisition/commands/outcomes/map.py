@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +17,7 @@ from acquisition.terminal.layout import table_lines
 from acquisition.terminal.progress import sign_of_life
 from analysis.report.page import MAP_PAGE, with_map
 from analysis.report.style import format_value, short_number
-from analysis.sample_maps.files import nexus_bytes, npz_bytes
+from analysis.sample_maps.files import nexus_bytes, npz_bytes, require_nexus
 from analysis.sample_maps.page import map_html
 from analysis.sample_maps.sample_map import UNITS, SampleMap
 from analysis.sample_maps.sigma_table import MAPPED
@@ -25,35 +27,74 @@ from instrument.text.atomic_file import read_file, write_whole
 _MOST_BYTES = 32 * 1024**2  # of fit.json
 _MOST_REPORT_BYTES = 512 * 1024**2
 _DEFAULT = "oren_nayar"
+_REPORT = "report.html"
+
+SignOfLife = Callable[[str], AbstractContextManager[None]]
 
 
-def map_run(
-    run: Path, cell_mm: float | None, model: str | None, *, nexus: bool, as_json: bool
-) -> None:
-    """Map the run's sample, write map.npz and map.html into its folder, and print what it shows.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """Request for a map, as the options of the command have it.
 
-    model: by default the one that the run's fit chose, if a map can fit it. nexus: map.nxs, too.
+    cell_mm: side of a cell; None for the usual one. model: None for the one that the run's fit
+    chose, if a map can fit it. nexus: map.nxs, too.
     """
-    wanted, note = (model, "") if model is not None else _chosen(run)
-    require_model(wanted, MAPPED)
+
+    cell_mm: float | None = None
+    model: str | None = None
+    nexus: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Mapped:
+    """Map of a run with the content of its files by name; note: on the choice of its model."""
+
+    found: SampleMap
+    files: Mapping[str, bytes]
+    note: str
+
+
+def map_run(run: Path, asked: Asked, *, as_json: bool) -> None:
+    """Map the run's sample, write map.npz and map.html into its folder, and print what it shows."""
+    require_options(asked)
+    mapped = map_of(run, asked, sign_of_life)
+    written = write_map(run, mapped.files)
+    if as_json:
+        print_json({**map_json(mapped.found), "files": written})
+        return
+    _print(mapped.found, mapped.note)
+    print_lines(["", *written])
+
+
+def require_options(asked: Asked) -> None:
+    """Raise `InputError` for an option that is wrong for every run."""
+    if asked.model is not None:
+        require_model(asked.model, MAPPED)
+    if asked.nexus:
+        require_nexus()
+
+
+def map_of(run: Path, asked: Asked, sign: SignOfLife) -> Mapped:
+    """Map the run's sample; `sign` shows that it is under way. Raises as `map_sample` does."""
+    model, note = (asked.model, "") if asked.model is not None else _chosen(run)
     with Record.open(run) as record:
         loaded = load_run_inputs(record)
-        with sign_of_life("map of the sample"):
-            found = map_sample(record, loaded, wanted, cell_mm)
-            report = run / "report.html"
-            page = map_html(found, report.name if report.is_file() else None)
+        with sign("map of the sample"):
+            found = map_sample(record, loaded, model, asked.cell_mm)
+            page = map_html(found, _REPORT if (run / _REPORT).is_file() else None)
             files = {"map.npz": npz_bytes(found), MAP_PAGE: page.encode()}
-            if nexus:
+            if asked.nexus:
                 files["map.nxs"] = nexus_bytes(found)
+    return Mapped(found, files, note)
+
+
+def write_map(run: Path, files: Mapping[str, str | bytes]) -> list[str]:
+    """Write the files of a map into the run's folder, and return their paths."""
     for name, content in files.items():
         write_whole(run / name, content)
-    if report.is_file():
-        _link_from(report)
-    if as_json:
-        print_json({**_json(found), "files": [str(run / name) for name in files]})
-        return
-    _print(found, note)
-    print_lines(["", *(str(run / name) for name in files)])
+    if (run / _REPORT).is_file():
+        _link_from(run / _REPORT)
+    return [str(run / name) for name in files]
 
 
 def _link_from(report: Path) -> None:
@@ -107,7 +148,8 @@ def _rows(found: SampleMap) -> Iterator[tuple[str, ...]]:
         yield (name, *texts, format_value(value, u, unit))
 
 
-def _json(found: SampleMap) -> dict[str, Any]:
+def map_json(found: SampleMap) -> dict[str, Any]:
+    """Content of the output of --json, but for the names of files."""
     rows, columns = found.chi2.shape
     parameters = {}
     for name in found.values:

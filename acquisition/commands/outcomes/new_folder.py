@@ -20,7 +20,7 @@ def require_new_folder(folder: Path, option: str) -> None:
         raise InputError(f"{option} {folder}: there is no folder {folder.parent}: make it first")
 
 
-def write_files(folder: Path, files: Mapping[str, str]) -> None:
+def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
     """Write the files by name into the folder; raises `StorageError` where the disk fails."""
     try:
         folder.mkdir(exist_ok=True)

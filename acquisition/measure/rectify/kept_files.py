@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 FOLDER, CELLS_FOLDER = "frames", "cells"
 _FRAME = re.compile(rf"{FOLDER}/(\d{{6,}})-\d{{4,}}\.tiff", re.ASCII)
@@ -21,6 +22,11 @@ def dark_name(exposure_s: float) -> str:
 def cells_name(step: int) -> str:
     """Return the file of the light of the cells at a step, for protocols with `maps`."""
     return f"{CELLS_FOLDER}/{step:06d}.npy"
+
+
+def has_kept(run: Path) -> bool:
+    """Return True if a run's folder has frames or cells."""
+    return any((run / name).is_dir() for name in (FOLDER, CELLS_FOLDER))
 
 
 def step_of(name: str) -> int | None:

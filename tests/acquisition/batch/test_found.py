@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.batch.found import TABLES, sources_in
+from acquisition.batch.found import TABLES, runs_in, sources_in
 from instrument.errors import InputError
 from instrument.record.record import FILE_NAME
 
@@ -64,3 +64,19 @@ def test_nothing_to_fit_is_refused(tmp_path: Path) -> None:
     _make(tmp_path, FILE_NAME)
     with pytest.raises(InputError, match="is one run"):
         sources_in(tmp_path)
+
+
+def test_runs_are_found_by_what_they_have_and_the_others_are_named(tmp_path: Path) -> None:
+    rng = random.Random(9)
+    names = {f"{rng.choice(['', 'a/', 'a/b/', 'c/'])}run{n}" for n in range(12)}
+    wanted = set(rng.sample(sorted(names), 5))
+    _make(tmp_path, "table.csv", "notes.txt", *(f"{name}/{FILE_NAME}" for name in names))
+    found = runs_in(tmp_path, "map", lambda run: run.relative_to(tmp_path).as_posix() in wanted, "")
+    assert list(found.sources) == sorted(wanted)
+    assert all(found.sources[name] == tmp_path / name for name in wanted)
+    assert list(found.others) == sorted(names - wanted)
+    with pytest.raises(InputError, match=r"that has frames; without: .* and 9 more$"):
+        runs_in(tmp_path, "map", lambda _: False, "frames")
+    _make(tmp_path, FILE_NAME)
+    with pytest.raises(InputError, match=f"is one run: gonio map {tmp_path}, without --all"):
+        runs_in(tmp_path, "map", lambda _: True, "frames")

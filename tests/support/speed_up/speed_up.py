@@ -20,10 +20,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from acquisition.batch.processes import cores, on_processes
-from acquisition.batch.summary import Outcome, as_csv
+from acquisition.batch.summary import Outcome
 from acquisition.benchmark.output.files import empty_folder
 from acquisition.commands.fit import Asked
 from acquisition.commands.many.fit_all import keep_files
+from acquisition.commands.many.fits_table import as_csv
 from acquisition.commands.many.one_fit import fit_one
 from acquisition.results.sources import Wanted
 from analysis.models import MODELS
@@ -75,13 +76,13 @@ def timing(sources: dict[str, Path], workers: int, asked: Asked, out: Path) -> T
     outcomes: list[Outcome] = []
     begun_s = _clocks()
     for _, outcome in on_processes(work, list(sources.items()), workers):
-        if not isinstance(outcome, Outcome) or outcome.fit is None:
+        if not isinstance(outcome, Outcome) or outcome.result is None:
             raise RuntimeError(f"{outcome}: a benchmark's source was not fitted")
         keep_files(out, outcome)
         outcomes.append(outcome)
     as_csv(outcomes)
     wall_s, serial_s, work_s = (end - begin for end, begin in zip(_clocks(), begun_s, strict=True))
-    fits = {o.source: o.fit for o in sorted(outcomes, key=lambda o: o.source)}
+    fits = {o.source: o.result for o in sorted(outcomes, key=lambda o: o.source)}
     return Timing(workers=workers, wall_s=wall_s, serial_s=serial_s, work_s=work_s, fits=fits)
 
 

@@ -1,4 +1,4 @@
-"""`gonio fit --all --scheduler`: a Dask cluster gives what this computer's processes give."""
+"""`gonio fit --all --scheduler`, and `map`: a Dask cluster gives what local processes give."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from acquisition.batch.cluster import connected, on_cluster
 from acquisition.batch.lost import Lost
 from instrument.errors import InputError
 from tests.support.batch.local_cluster import local_cluster
+from tests.support.batch.runs import Mapped, mapped_together
 from tests.support.batch.tables import MODELS, write_tables
 from tests.support.batch.work import Item, attempts, squared
 from tests.support.command import gonio_here
@@ -51,6 +52,12 @@ def test_results_are_those_of_each_source_alone_bit_for_bit(folder: Path, schedu
         alone = gonio_here("fit", folder / result["source"], *models)
         assert result["exit_code"] == alone.returncode
         assert json.dumps(result["fit"]) == (alone.stdout.strip() or "null")
+
+
+def test_maps_are_those_of_each_run_alone_bit_for_bit(
+    measured: Path, alone: dict[str, Mapped], tmp_path: Path, scheduler: str
+) -> None:
+    assert mapped_together(measured, tmp_path, "--scheduler", scheduler) == alone
 
 
 def test_killed_workers_cost_nothing_but_time(tmp_path: Path, scheduler: str) -> None:
