@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -121,6 +123,18 @@ def test_text_for_a_stalled_reader_is_dropped_until_it_reads_again(
         assert reader.read(1 << 20) == b"again\n"
 
 
+@contextmanager
+def struck_soon() -> Iterator[None]:
+    """Send this thread a SIGINT during the block, however long it is kept from running."""
+    main = threading.get_ident()
+    strike = threading.Timer(0.2, signal.pthread_kill, (main, signal.SIGINT))
+    strike.start()
+    try:
+        yield
+    finally:
+        strike.join()
+
+
 def test_a_wait_for_a_reader_that_was_interrupted_is_not_repeated(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -128,8 +142,7 @@ def test_a_wait_for_a_reader_that_was_interrupted_is_not_repeated(
     reading, writing = os.pipe()
     with os.fdopen(reading, "rb", 0), os.fdopen(writing, "w", encoding="utf-8") as ours:
         monkeypatch.setattr(sys, "stdout", ours)
-        threading.Timer(0.2, signal.pthread_kill, (threading.get_ident(), signal.SIGINT)).start()
-        with pytest.raises(KeyboardInterrupt), lasting_streams():
+        with pytest.raises(KeyboardInterrupt), struck_soon(), lasting_streams():
             sys.stdout.writelines("x" * 4095 + "\n" for _ in range(100))
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from instrument import processes
+from instrument.clock import SystemClock
 from instrument.errors import StorageError
 from instrument.record import write_lock
 from instrument.record.record import FILE_NAME, Record
@@ -80,12 +81,22 @@ def test_a_writer_gives_up_after_a_minute(tmp_path: Path, caplog: pytest.LogCapt
     assert NOTICE_S < PATIENCE_S / 10
 
 
-def test_a_wait_ends_at_once_with_a_signal(tmp_path: Path) -> None:
+def test_a_wait_ends_at_once_with_a_signal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """SQLite's own wait would hold a Ctrl-C back; what waits for the lock is written once."""
+
+    class Struck(SystemClock):
+        """Clock of a wait that is interrupted, once, when it has begun."""
+
+        def sleep(self, seconds: float) -> None:
+            if not strikes:
+                strikes.append(signal.SIGINT)
+                signal.pthread_kill(main, signal.SIGINT)
+            super().sleep(seconds)
+
+    main, strikes = threading.get_ident(), list[signal.Signals]()
+    monkeypatch.setattr(write_lock, "SystemClock", Struck)
     with Record.create(tmp_path / "run", {}) as record:
         with held(record.folder / FILE_NAME):
-            main = threading.get_ident()
-            threading.Timer(0.2, signal.pthread_kill, (main, signal.SIGINT)).start()
             begun_s = time.monotonic()
             with pytest.raises(KeyboardInterrupt):
                 record.add_event("2026", "operator", "at last")
