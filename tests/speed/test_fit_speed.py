@@ -86,7 +86,7 @@ def test_the_ladder_and_an_exact_candidate_cost_a_few_lmfit_fits(scan: Measureme
     ratio = cpu_ratio(
         lambda: choices.append(choose(unexplained, method="functional")),
         lambda: choose(scan, method="functional"),
-        3,
+        2,
     )
     assert choices[-1].verdict == "none adequate"
     assert ratio < 9

@@ -54,7 +54,7 @@ def test_deviations_have_the_size_of_the_stated_uncertainty(
     """
     if not slow and (kind, albedo, rig) != ("matt", 0.03, "paper_1995"):
         pytest.skip("with --slow")
-    draws, shrink = (60, 1) if slow else (4, 3)
+    draws, shrink = (60, 1) if slow else (2, 3)
     found = _deviations(rig, kind, albedo, draws, shrink, tmp_path)
     wrong = []
     for name, own in {**by_band(found), **by_parameter(found)}.items():

@@ -149,11 +149,11 @@ def soaked(azimuths: int, views: int) -> Iterator[Soaked]:
 def test_points_at_the_end_of_a_long_scan_cost_no_more_than_at_the_beginning(slow: bool) -> None:
     """Promise: memory within 20 MB and CPU time within 10 % over 20 000 points.
 
-    Without --slow it compares 200 points with 200, within 25 %: too few to average over other load.
+    Without --slow it compares 160 points with 160, within 25 %: too few to average over other load.
     The first arc, for which the windows are computed, is then left out.
     """
     azimuths, views, warm, part, allowed = (
-        (20, 100, 0, 1000, 0.10) if slow else (1, 80, 80, 200, 0.25)
+        (20, 100, 0, 1000, 0.10) if slow else (1, 64, 64, 160, 0.25)
     )
     with soaked(azimuths, views) as done:
         watch, steps = done.watch, len(done.plan.steps)

@@ -24,6 +24,13 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return finished_run(protocol, folder / "run")
 
 
+@pytest.fixture
+def plain_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages without charts, which take most of the time of a small map."""
+    page = "acquisition.commands.outcomes.map.map_html"
+    monkeypatch.setattr(page, lambda *_: "<html></html>")
+
+
 def test_a_map_is_written_and_told(run: Path) -> None:
     done = gonio_here("map", run, "--cell-mm", 2, "--nexus")
     assert done.returncode == 0, done.stderr
@@ -48,6 +55,7 @@ def test_a_map_is_written_and_told(run: Path) -> None:
         assert data["y"][0] == 24.0
 
 
+@pytest.mark.usefixtures("plain_page")
 def test_a_model_may_be_named_and_the_result_is_json(run: Path) -> None:
     model = "oren_nayar+torrance_sparrow"
     done = gonio_here("map", run, "--cell-mm", "3", "--model", model, "--json")
@@ -63,6 +71,7 @@ def test_a_model_may_be_named_and_the_result_is_json(run: Path) -> None:
     assert told["parameters"]["albedo"]["beyond_u"] == pytest.approx(0.016, abs=0.012)  # mottling
 
 
+@pytest.mark.usefixtures("plain_page")
 def test_what_cannot_be_mapped_is_refused_before_a_file_is_written(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

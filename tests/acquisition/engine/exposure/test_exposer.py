@@ -15,7 +15,7 @@ from instrument.config.simulated.sample import SimulatedSample
 from instrument.devices import Frame
 from instrument.record.record import Record
 from tests.support.paths import CONFIGS
-from tests.support.scans import changed, small_scan
+from tests.support.scans import changed, shrunk, small_scan
 from tests.support.stand_ins import Spy
 from tests.support.whole_scans.stopped_scan import scan
 
@@ -29,7 +29,7 @@ def test_a_dark_is_taken_at_every_exposure_used(small: Loaded, record: Record) -
 def test_by_hand_the_darks_come_first_and_the_lamp_is_covered_once(record: Record) -> None:
     demo = load_protocol(CONFIGS / "protocols" / "demo.yaml", CONFIGS / "rigs" / "paper_1995.yaml")
     sweep = {"theta_i_deg": [30.0, 60.0], "dphi_deg": [0.0], "theta_r_deg": [-40.0, 0.0, 50.0]}
-    loaded, calls = changed(demo, sweeps=[sweep]), []
+    loaded, calls = changed(shrunk(demo, 4), sweeps=[sweep]), []
     devices = open_devices(loaded)
     lamp = Spy(devices.lamp, calls, "lamp")
     scan(loaded, record, changed_devices=lambda _: replace(devices, lamp=lamp))  # type: ignore[arg-type]  # a spy
@@ -44,7 +44,7 @@ def test_by_hand_the_darks_come_first_and_the_lamp_is_covered_once(record: Recor
 
 
 def test_the_brightest_part_of_the_window_stays_within_the_target(record: Record) -> None:
-    loaded = small_scan(shrink=1)
+    loaded = small_scan(shrink=2)
     scan(loaded, record)
     camera, target = loaded.rig.camera, loaded.protocol.exposure_target
     full = camera.max_dn - camera.black_level_dn
