@@ -1,6 +1,6 @@
 """The table `measurements.csv`: one row for each measured geometry.
 
-It states all that a fit needs, in the columns of `analysis.data.csv_columns`, and numbers with all
+It states all that a fit needs, in the columns of `analysis.data.csv.columns`, and numbers with all
 their digits: `gonio fit` gives the same from the table as from the run's folder.
 """
 
@@ -15,8 +15,8 @@ from itertools import repeat
 import numpy as np
 
 from acquisition.results.reduction import Reduced, root_sum_square, shared_errors
-from analysis.data import csv_columns as columns
 from analysis.data.acceptance import Acceptance
+from analysis.data.csv import columns
 from instrument.config.load import Loaded
 from instrument.geometry import FloatArray, IntArray
 

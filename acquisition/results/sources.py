@@ -15,7 +15,7 @@ from acquisition.results.reduction import reduced_run, require_usable
 from acquisition.results.run_folder import load_run_inputs
 from analysis.choice.notes import Note, NoteCode
 from analysis.data.acceptance import Acceptance
-from analysis.data.csv_table import CsvTable, table_of
+from analysis.data.csv.table import CsvTable, table_of
 from analysis.data.curet import TABLE, VALUES, read_curet
 from analysis.data.measurements import Measurements, SharedError
 from analysis.data.repeats import Repeats, mean_of_repeats

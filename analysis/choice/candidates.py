@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from analysis.accuracy.cheapest import cheapest
 from analysis.accuracy.rough_surface import ROUGH_SURFACE
 from analysis.choice.ladder import SAME_PREDICTION, functional_form
 from analysis.data.acceptance import Acceptance
+from analysis.data.covariance import full_covariance, has_shared_errors
 from analysis.data.measurements import Measurements
 from analysis.fit.criteria import enough_chi2
 from analysis.fit.first_fit import FirstFit, FirstFits, enough_points
@@ -20,25 +21,79 @@ from analysis.fit.relative_scale import FACTOR_NAME, normalise_lamp_levels
 from analysis.models import MODELS, Model
 from instrument.errors import NotDetermined
 
-# chi2 relative to the lowest, both on a part of very many points: a smaller model that is preferred
-# to a larger one has hardly more. It is beyond this factor with all points as well.
-_HOPELESS, _HOPELESS_OF_ALL = 1.5, 1.25
+# chi2 relative to the lowest, both on a part of very many points, beyond which a model is not
+# fitted to all: a smaller model that is preferred to a larger one has hardly more. Errors that
+# points share may explain much of chi2, and so may averaging: the larger factor. With all points
+# chi2 is then above the lowest by at least this part of that factor.
+_HOPELESS, _HOPELESS_WITH_SHARED, _OF_ALL = 1.5, 10.0, 0.8
+# Relative tolerance and steps of the fit to the part with shared errors.
+_QUICK_RTOL, _QUICK_STEPS = 1e-2, 5
+
+
+@dataclass(frozen=True, slots=True)
+class Screen:
+    """Search for models that are far behind on a part of very many points.
+
+    part: first fits to it. ladder: rungs of all candidates. with_shared: errors that points share
+    are stated, or the model is averaged. known: chi2 by name of the model.
+    """
+
+    part: FirstFits
+    ladder: Sequence[Sequence[str]]
+    with_shared: bool
+    known: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def factor(self) -> float:
+        """chi2 over the lowest, beyond which a model is far behind."""
+        return _HOPELESS_WITH_SHARED if self.with_shared else _HOPELESS
+
+    def hopeless(self, models: Iterable[Model]) -> set[str]:
+        """Names of the models that are far behind the best that the ladder has for the part."""
+        chi2 = {model.name: self._chi2(model) for model in models}
+        least = min(self._least(), min(chi2.values(), default=math.inf))
+        return {name for name, own in chi2.items() if own > self.factor * least}
+
+    def _least(self) -> float:
+        """Least chi2 of the models up to the first rung that explains the part.
+
+        Without the integrated models, which are costly: a functional form is hardly farther off.
+        """
+        least = math.inf
+        for rung in self.ladder:
+            quick = [MODELS[name] for name in rung if functional_form(name) is None]
+            least = min([least, *map(self._chi2, quick)])
+            problem = self.part.of(quick[0]).problem
+            if least <= enough_chi2(self.part.measurements, problem):
+                break
+        return least
+
+    def _chi2(self, model: Model) -> float:
+        if model.name not in self.known:
+            first, m = self.part.of(model), self.part.measurements
+            chi2 = first.solution.chi2
+            if has_shared_errors(m) and m.u_random is not None:
+                problem = replace(first.problem, covariance=full_covariance(m, first.brdf))
+                start, steps = first.solution.x, _QUICK_STEPS
+                chi2 = problem.solve(start, rtol=_QUICK_RTOL, most_steps=steps).chi2
+            self.known[model.name] = chi2
+        return self.known[model.name]
 
 
 @dataclass(frozen=True, slots=True)
 class Candidates:
     """First fits to the measurements in the order of the names, and models left out.
 
-    every: fit an integrated model even where its functional form is accurate enough. ladder: rungs
-    of all candidates, of which, of very many points, those are fitted roughly that are far behind
-    on a part of them; empty: all are fitted. left_out: models with too many parameters for the
-    points.
+    every: fit an integrated model even where its functional form is accurate enough. screen: of
+    models that are fitted to a part of very many points alone, as they are far behind there: chi2
+    of all points is then known to about a hundredth, which is no reason to prefer one. None: all
+    are fitted to all points. left_out: models with too many parameters for the points.
     """
 
     fits: FirstFits
     robust: bool
     every: bool
-    ladder: Sequence[Sequence[str]] = ()
+    screen: Screen | None = None
     first: tuple[FirstFit, ...] = ()
     left_out: tuple[str, ...] = ()
 
@@ -50,12 +105,19 @@ class Candidates:
         robust: bool,
         every: bool,
         ladder: Sequence[Sequence[str]] = (),
+        averaged: bool = False,
     ) -> Candidates:
         """First fits of the named models.
 
-        Raises `NotDetermined` where the points are too few for all, `KeyError` for an unknown one.
+        ladder: rungs of all candidates, which are screened; empty: they are not. averaged: the
+        models will be averaged over the rig's acceptance. Raises `NotDetermined` where the points
+        are too few for all, `KeyError` for an unknown one.
         """
-        found = cls(FirstFits(measurements), robust, every, ladder).with_more(names)
+        fits = FirstFits(measurements)
+        screen = None
+        if fits.part is not None and ladder:
+            screen = Screen(fits.part, ladder, averaged or has_shared_errors(measurements))
+        found = cls(fits, robust, every, screen).with_more(names)
         if not found.first:
             n = measurements.size
             few = "1 point is" if n == 1 else f"{n} points are"
@@ -73,7 +135,7 @@ class Candidates:
         first = {f.model.name: f for f in self.first}
         named = [MODELS[name] for name in names]
         enough = [model for model in named if enough_points(model, m)]
-        hopeless = self._hopeless(enough) if self.ladder else set()
+        hopeless = self.screen.hopeless(enough) if self.screen else set()
         for model in enough:
             form = first.get(functional_form(model.name) or "")
             if self.every or form is None or _form_inaccurate(form, m):
@@ -82,29 +144,20 @@ class Candidates:
         few = tuple(model.name for model in named if not enough_points(model, m))
         return replace(self, first=tuple(first.values()), left_out=(*self.left_out, *few))
 
-    def _hopeless(self, models: Sequence[Model]) -> set[str]:
-        """Models whose chi2 on a part of very many points is far above the lowest there.
-
-        They are fitted to the part alone: chi2 of all points is then known to about a hundredth,
-        which is no reason to prefer one. Only for points that share no errors, which else may
-        explain most of chi2.
-        """
-        part = self.fits.part
-        if part is None:
-            return set()
-        chi2 = {model.name: part.of(model).solution.chi2 for model in models}
-        least = min(*chi2.values(), _least_chi2(part, self.ladder))
-        return {name for name, own in chi2.items() if own > _HOPELESS * least}
-
-    def checked(self) -> Candidates:
+    def checked(self, results: Iterable[FitResult]) -> Candidates:
         """The candidates, with those fitted to all points that are not far behind there.
 
-        Without this a model would be left out whose misfit lies where the part has many points.
+        results: of all of them. Without this a model would be left out whose misfit lies where the
+        part has many points.
         """
-        least = min((f.solution.chi2 for f in self.first if not f.rough), default=math.inf)
-        most = _HOPELESS_OF_ALL * least
+        if self.screen is None:
+            return self
+        chi2 = {c.model: c.problem.chi2(c.x) if c.chi2 is None else c.chi2 for c in results}
+        whole = [chi2[f.model.name] for f in self.first if not f.rough]
+        most = _OF_ALL * self.screen.factor * min(whole, default=math.inf)
         checked = (
-            self.fits.of(f.model) if f.rough and f.solution.chi2 <= most else f for f in self.first
+            self.fits.of(f.model) if f.rough and chi2[f.model.name] <= most else f
+            for f in self.first
         )
         return replace(self, first=tuple(checked))
 
@@ -125,21 +178,6 @@ class Candidates:
         """Fit the candidate of that name with all uncertainties and intervals."""
         (own,) = (f for f in self.first if f.model.name == name)
         return refine(self.fits.polished(own), self.fits.measurements, acceptance, self.robust)
-
-
-def _least_chi2(part: FirstFits, ladder: Iterable[Sequence[str]]) -> float:
-    """Least chi2 of the models up to the first rung that explains the part of the points.
-
-    Without the integrated models, which are costly: a functional form is hardly farther off.
-    """
-    least = math.inf
-    for rung in ladder:
-        quick = [MODELS[name] for name in rung if functional_form(name) is None]
-        fits = [part.of(model) for model in quick]
-        least = min([least, *(one.solution.chi2 for one in fits)])
-        if any(one.solution.chi2 <= enough_chi2(part.measurements, one.problem) for one in fits):
-            break
-    return least
 
 
 def _best(first: Iterable[FirstFit]) -> FirstFit:

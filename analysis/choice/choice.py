@@ -22,7 +22,6 @@ from analysis.choice.preference import simplest
 from analysis.choice.runs_test import worst_stretches
 from analysis.choice.symmetry_test import Symmetry, symmetry
 from analysis.data.acceptance import Acceptance
-from analysis.data.covariance import has_shared_errors
 from analysis.data.measurements import Measurements
 from analysis.fit.certificate import led_by_certificate
 from analysis.fit.criteria import LEAST_NOISE
@@ -89,9 +88,9 @@ def choose(
     require_light(measurements)
     first, *others = ladder = _rungs(measurements, models, method)
     every = models is not None
-    if every or robust or acceptance or has_shared_errors(measurements):
+    if every or robust or measurements.free_levels:
         ladder = []
-    tried = Candidates.of(first, measurements, robust, every, ladder)
+    tried = Candidates.of(first, measurements, robust, every, ladder, acceptance is not None)
     fitted = _Fitted.of(tried.refined(acceptance), tried.measurements)
     for rung in others:
         explained = bool(fitted.within_u)
@@ -101,7 +100,7 @@ def choose(
         fitted = fitted.with_new(tried, acceptance)
         if explained:
             break
-    tried = tried.checked()
+    tried = tried.checked(fitted.results)
     return _chosen(tried, fitted.with_new(tried, acceptance), acceptance, certificate_leads)
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from analysis.data.inverse_root import SymmetricRoot, TriangularRoot, inverse_root
 from analysis.data.measurements import Measurements
 from analysis.data.sweeps import signed_view, sweeps
 from instrument.geometry import BoolArray, Brdf, FloatArray, Geometry, IntArray
@@ -49,8 +50,7 @@ class Covariance:
     names: tuple[str, ...] = ()
     _u: FloatArray = field(init=False, repr=False)
     _whitened: Columns = field(init=False, repr=False)
-    _vectors: FloatArray = field(init=False, repr=False)
-    _shrink: FloatArray = field(init=False, repr=False)
+    _root: SymmetricRoot | TriangularRoot = field(init=False, repr=False)
     log_determinant: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -58,40 +58,36 @@ class Covariance:
             raise ValueError(
                 f"variance = {self.variance.min():g}; allowed: finite, more than 0 for every point"
             )
-        # In units of the independent errors C is 1 + V V^T, and with V^T V = W diag(s) W^T its
-        # inverse root is 1 - V W diag((1 - 1 / sqrt(1 + s)) / s) W^T V^T. This gives the chi2 of
-        # a Cholesky factor of C at a cost of K^3, without an N x N matrix.
+        # In units of the independent errors C is 1 + V V^T, and its inverse root 1 - V Q V^T: this
+        # gives the chi2 of a Cholesky factor of C at a cost of K^3, without an N x N matrix.
         object.__setattr__(self, "_u", np.sqrt(self.variance))
         V = _scaled(self.common, 1 / self._u)
-        s, W = np.linalg.eigh(_product(V.T, V))
-        root = np.sqrt(1 + np.maximum(s, 0.0))
         object.__setattr__(self, "_whitened", V)
-        object.__setattr__(self, "_vectors", W)
-        object.__setattr__(self, "_shrink", 1 / (root * (1 + root)))
-        log_det = np.sum(np.log(self.variance)) + 2 * np.sum(np.log(root))
-        object.__setattr__(self, "log_determinant", float(log_det))
+        object.__setattr__(self, "_root", inverse_root(_product(V.T, V)))
+        log_det = float(np.sum(np.log(self.variance))) + self._root.log_determinant
+        object.__setattr__(self, "log_determinant", log_det)
 
     def whiten(self, x: FloatArray) -> FloatArray:
-        """C^(-1/2) x for x of shape (N,) or (N, M), in the data's unit.
+        """R x for x of shape (N,) or (N, M), in the data's unit, with R^T R = C^-1.
 
         The result, of the same shape, is in units of u: residuals become independent with u = 1.
         """
         return self._whiten_shared(x / (self._u if x.ndim == 1 else self._u[:, np.newaxis]))
 
     def _whiten_shared(self, y: FloatArray) -> FloatArray:
-        """(1 + V V^T)^(-1/2) y, of y in units of the independent errors."""
+        """An inverse root of 1 + V V^T times y, of y in units of the independent errors."""
         if self.common.shape[1] == 0:
             return np.asarray(y)
-        inner = self._vectors.T @ (self._whitened.T @ y)
-        shrink = self._shrink if y.ndim == 1 else self._shrink[:, np.newaxis]
-        return np.asarray(y - self._whitened @ (self._vectors @ (shrink * inner)))
+        return np.asarray(y - self._whitened @ self._root.shrunk(self._whitened.T @ y))
 
     def pulls(self, residual: FloatArray) -> FloatArray:
         """Most likely value (K,) of each shared error, in units of its u, given a residual (N,).
 
         The mean of the errors' normal distribution given the residual: common^T C^-1 residual.
         """
-        return np.asarray(self._whitened.T @ self._whiten_shared(self.whiten(residual)))
+        if self.common.shape[1] == 0:
+            return np.zeros(0)
+        return self._root.solved(self._whitened.T @ (residual / self._u))
 
     def subset(self, points: BoolArray) -> Covariance:
         """Covariance of the points marked True in `points` (N,)."""

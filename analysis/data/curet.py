@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.data.csv_columns import BRDF
+from analysis.data.csv.columns import BRDF
 from analysis.data.measurements import Measurements
 from instrument.errors import InputError
 from instrument.geometry import FloatArray

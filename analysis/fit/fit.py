@@ -156,8 +156,7 @@ def refine(
     """
     m = measurements
     if first.rough:
-        as_it_is = AveragedFit(first.problem, first.solution, averaged=False, converged=True)
-        return _result(m, as_it_is, first.problem.covariance, "none")
+        return _rough_result(first, m)
     if m.free_levels:
         m = normalise_lamp_levels(m, first.brdf)
         first = FirstFits(m).of(first.model)
@@ -170,6 +169,16 @@ def refine(
     if m.u_random is not None and _rejected(fitted):
         fitted = _widened(linear, fitted, m, acceptance)
     return _result(m, fitted, linear.problem.covariance, u)
+
+
+def _rough_result(first: FirstFit, m: Measurements) -> FitResult:
+    """The result of a fit that is not followed, with the chi2 that it has as shared errors are."""
+    problem = first.problem
+    if has_shared_errors(m):
+        stated = _with_noise(first, m)
+        problem = replace(problem, covariance=full_covariance(stated, first.brdf))
+    as_it_is = AveragedFit(problem, first.solution, averaged=False, converged=True)
+    return _result(m, as_it_is, problem.covariance, "none")
 
 
 def with_linear_u(result: FitResult, m: Measurements) -> FitResult:

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from analysis.choice.choice import Choice, choose
 from analysis.choice.ladder import functional_form
-from analysis.data.measurements import Measurements
+from analysis.data.measurements import Measurements, SharedError
 from analysis.fit import first_fit
+from analysis.fit.fit import FitResult
 from analysis.models import MODELS
 from instrument.geometry import Geometry
 
@@ -25,7 +26,7 @@ MATERIALS = ("oren_nayar", "oren_nayar+torrance_sparrow", "lambert+ggx", "minnae
 # its value does not matter.
 MOST_ABOVE, OUT_OF_QUESTION = 1.2, 100.0
 DEEPER = 0.999  # chi2 of a deeper minimum, as a fraction of that which the other search found
-BOUNDED = (1, 4)  # seeds
+BOUNDED, BOUNDED_WITH_SHARED = (1, 4), (2,)  # seeds
 FACTOR = 8  # of the number of points, from the program's limits to those of the bounded form
 
 
@@ -68,6 +69,20 @@ def compared(m: Measurements, very_many: int, part: int, patch: pytest.MonkeyPat
     return Compared(quick, choose(m), quick_s, time.process_time() - begun_s)
 
 
+def with_shared_errors(m: Measurements, seed: int) -> Measurements:
+    """Give the points of each incidence the errors of one lamp setting and of one tile."""
+    draw = np.random.default_rng([seed, 1])
+    _, incidence = np.unique(m.theta_i_deg, return_inverse=True)
+    size = incidence.max() + 1
+    factor = (1 + 0.003 * draw.standard_normal(size)[incidence]) * (1 + 0.01 * draw.normal())
+    tiles = SharedError("tile", np.full(m.size, 0.003), incidence)
+    certificate = SharedError.common_to_all("certificate", 0.01, m.size)
+    return replace(
+        m, brdf=m.brdf * factor, lamp_setting=incidence, shared=(tiles, certificate),
+        u_theta_i_deg=0.05,
+    )  # fmt: skip
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_the_choice_is_that_of_a_search_with_all_points(
@@ -76,7 +91,6 @@ def test_the_choice_is_that_of_a_search_with_all_points(
     monkeypatch: pytest.MonkeyPatch,
     record_property: Callable[[str, object], None],
 ) -> None:
-    """Unless the quick search finds a deeper minimum of a model: then its choice is the better."""
     very_many, part = first_fit._VERY_MANY, first_fit._PART
     if not slow and seed not in BOUNDED:
         pytest.skip("with --slow")
@@ -84,13 +98,50 @@ def test_the_choice_is_that_of_a_search_with_all_points(
         very_many, part = very_many // FACTOR, part // FACTOR
     found = compared(drawn(seed, 2 * very_many), very_many, part, monkeypatch)
     record_property("time of the search with all points", found.whole_s / found.quick_s)
-    quick, whole = found.quick, found.whole
+    require_same_choice(found.quick, found.whole)
+    assert left(found.quick)
+    shown = {c.model: c.chi2 or 0.0 for c in found.quick.candidates}
+    least = min(c.chi2 or 0.0 for c in found.whole.candidates)
+    for one in in_both(found.quick, found.whole):
+        assert one.chi2 is not None
+        if one.chi2 < OUT_OF_QUESTION * least:
+            assert shown[one.model] < MOST_ABOVE * one.chi2, one.model
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(6))
+def test_so_it_is_where_points_share_errors(
+    seed: int,
+    slow: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    record_property: Callable[[str, object], None],
+) -> None:
+    very_many, part = first_fit._VERY_MANY, first_fit._PART
+    if not slow and seed not in BOUNDED_WITH_SHARED:
+        pytest.skip("with --slow")
+    if not slow:
+        very_many, part = very_many // FACTOR, part // FACTOR
+    m = with_shared_errors(drawn(seed, 2 * very_many), seed)
+    found = compared(m, very_many, part, monkeypatch)
+    record_property("time of the search with all points", found.whole_s / found.quick_s)
+    require_same_choice(found.quick, found.whole)
+    assert left(found.quick) or seed % 2
+
+
+def left(choice: Choice) -> list[str]:
+    """Names of the candidates that were not fitted to all points."""
+    return [c.model for c in choice.candidates if c.message == first_fit.LEFT]
+
+
+def require_same_choice(quick: Choice, whole: Choice) -> None:
+    """Fail where two searches choose another model or other values.
+
+    Unless the quick search finds a deeper minimum of a model: then its choice is the better.
+    """
     assert quick.best is not None
     assert whole.best is not None
     shown = {c.model: c.chi2 or 0.0 for c in quick.candidates}
-    # An integrated model may be left out by one search as no more accurate than its form.
-    both = [c for c in whole.candidates if c.model in shown or not functional_form(c.model)]
-    deeper = [c for c in both if shown[c.model] < DEEPER * (c.chi2 or 0.0)]
+    deeper = [c for c in in_both(quick, whole) if shown[c.model] < DEEPER * (c.chi2 or 0.0)]
     assert quick.verdict == whole.verdict
     if deeper:
         assert quick.best.bic <= whole.best.bic
@@ -100,9 +151,12 @@ def test_the_choice_is_that_of_a_search_with_all_points(
             if u is not None:
                 assert abs(quick.best.values[name] - whole.best.values[name]) < 0.1 * u, name
     assert all(c.converged or c.message == first_fit.LEFT for c in quick.candidates)
-    assert any(c.message == first_fit.LEFT for c in quick.candidates)
-    least = min(c.chi2 or 0.0 for c in whole.candidates)
-    for one in both:
-        assert one.chi2 is not None
-        if one.chi2 < OUT_OF_QUESTION * least:
-            assert shown[one.model] < MOST_ABOVE * one.chi2, one.model
+
+
+def in_both(quick: Choice, whole: Choice) -> list[FitResult]:
+    """The candidates of a search, but for integrated models that the other one left out.
+
+    That may find one no more accurate than its functional form.
+    """
+    names = {c.model for c in quick.candidates}
+    return [c for c in whole.candidates if c.model in names or not functional_form(c.model)]

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -12,17 +15,21 @@ from analysis.data.acceptance import Acceptance
 from analysis.fit.fit import fit
 from analysis.models import MODELS
 from instrument.config.load import Loaded
+from instrument.errors import Interlock
 from tests.support.scans import changed
 from tests.support.whole_scans.coverage_scans import Deviations, by_band, by_parameter
 from tests.support.whole_scans.real_bench import (
+    SAMPLES,
     measured,
     plaster_run,
     pulls_of,
     real_bench_run,
 )
 
-_RUNS = 600
+_RUNS = 600 * len(SAMPLES)
 _FEW = 2  # in a normal run
+# Of the runs, whose drawn lamp may drift so fast that the drift check stops the scan.
+_MOST_STOPPED = 0.02
 _COVERED = 1.96
 _MOST = {"albedo": 0.005, "sigma_deg": 0.3}  # rms error of sample A that is asked for
 _BENCHES, _VIEWS = 60, 31  # views as in the shipped protocol
@@ -31,8 +38,27 @@ _FAR = 4.0  # times that limit: no single run misses it by chance
 
 
 def _pulls(folder: Path, runs: int, lines: dict[str, float] | None = None) -> list[Deviations]:
-    loaded = (real_bench_run(number, folder, runs, lines=lines) for number in range(runs))
-    return [pulls_of(one, folder / str(number)) for number, one in enumerate(loaded)]
+    """Deviations of the runs that are not stopped; of many, in as many processes as cores."""
+    one = partial(_pull, folder=folder, runs=runs, lines=lines)
+    if runs == _FEW:
+        found = [one(number) for number in range(runs)]
+    else:
+        with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+            found = list(pool.map(one, range(runs)))
+    complete = [pulls for pulls in found if pulls is not None]
+    assert len(complete) >= (1 - _MOST_STOPPED) * runs
+    return complete
+
+
+def _pull(
+    number: int, folder: Path, runs: int, lines: dict[str, float] | None
+) -> Deviations | None:
+    try:
+        return pulls_of(real_bench_run(number, folder, runs, lines=lines), folder / str(number))
+    except Interlock as stopped:
+        if "let it warm up" not in str(stopped):
+            raise
+        return None
 
 
 @pytest.mark.slow
@@ -41,8 +67,9 @@ def test_deviations_on_a_real_bench_have_the_size_of_their_u(
 ) -> None:
     """Mean, standard deviation and coverage of (value - truth) / u, by band and by parameter.
 
-    `--slow`: 600 runs, within the limits that are asked of them; `--junitxml` shows the figures.
-    The points of a run share most errors. Otherwise a few runs, in which nothing is far off.
+    `--slow`: 600 runs of each sample, as 150 tell a parameter's mean to 0.08 u only, within the
+    limits that are asked of them; `--junitxml` shows the figures. The points of a run share most
+    errors. Otherwise a few runs, in which nothing is far off.
     """
     found = _pulls(tmp_path, _RUNS if slow else _FEW)
     wrong: list[tuple[str, float, float, float]] = []

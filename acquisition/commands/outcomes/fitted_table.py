@@ -11,7 +11,7 @@ import numpy as np
 
 from acquisition.results.measurements_csv import COLUMNS
 from acquisition.results.sources import Source
-from analysis.data import csv_columns as columns
+from analysis.data.csv import columns
 from analysis.data.measurements import Measurements
 from instrument.geometry import FloatArray, IntArray
 

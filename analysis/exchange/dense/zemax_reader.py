@@ -15,7 +15,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from analysis.data.csv_columns import ANGLES, BRDF
+from analysis.data.csv.columns import ANGLES, BRDF
 from analysis.exchange.dense.specular_grid import MEASURED, directions
 from analysis.exchange.dense.zemax import MARKS_KEY
 from analysis.exchange.exported import BrdfTable

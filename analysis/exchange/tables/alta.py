@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data.csv_columns import BRDF
+from analysis.data.csv.columns import BRDF
 from analysis.exchange.exported import BrdfTable, Export
 from analysis.exchange.tables.header import exact, stated
 from analysis.exchange.tables.rows import (

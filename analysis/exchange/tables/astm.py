@@ -23,7 +23,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from analysis.data.csv_columns import BRDF
+from analysis.data.csv.columns import BRDF
 from analysis.exchange.exported import BrdfTable, Export
 from analysis.exchange.tables.header import exact, stated, u_table
 from analysis.exchange.tables.rows import (

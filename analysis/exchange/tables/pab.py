@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from analysis.data.csv_columns import ANGLES, BRDF
+from analysis.data.csv.columns import ANGLES, BRDF
 from analysis.exchange.exported import BrdfTable, Export
 from analysis.exchange.tables.header import exact, stated, u_table
 from analysis.exchange.tables.rows import Row, parsed, table, words

@@ -16,7 +16,7 @@ from acquisition.plan.plan import make_plan
 from acquisition.results.sources import Wanted
 from acquisition.terminal.console import out
 from analysis.choice.choice import choose
-from analysis.data.csv_table import read_csv
+from analysis.data.csv.table import read_csv
 from analysis.models import MODELS
 from instrument.config.load import Loaded
 from instrument.config.protocol import Steps

@@ -22,7 +22,7 @@ from acquisition.results.measurements_csv import COLUMNS, measurements_csv
 from acquisition.results.reduction import Reduced, reduce
 from acquisition.rig import open_devices
 from analysis.data.acceptance import Acceptance
-from analysis.data.csv_table import read_table
+from analysis.data.csv.table import read_table
 from analysis.data.measurements import Measurements
 from instrument.config.load import Loaded
 from instrument.config.protocol import Metadata, References

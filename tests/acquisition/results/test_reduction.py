@@ -12,7 +12,7 @@ from acquisition.results.effects.lamp_level import DRIFT
 from acquisition.results.fitting import measurements
 from acquisition.results.measurements_csv import measurements_csv
 from acquisition.results.reduction import TILE, TILE_PLACEMENT, reduce, root_sum_square
-from analysis.data.csv_table import read_table
+from analysis.data.csv.table import read_table
 from analysis.models import MODELS
 from instrument.config.load import Loaded
 from instrument.config.protocol import WhiteTile

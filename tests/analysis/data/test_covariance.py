@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
+from analysis.data import inverse_root
 from analysis.data.covariance import Covariance, full_covariance, independent_covariance
 from analysis.data.measurements import Measurements, SharedError
 from analysis.models import MODELS
@@ -22,6 +23,13 @@ def matrix(C: Covariance) -> FloatArray:
     return np.diag(C.variance) + common @ common.T
 
 
+@pytest.fixture(params=["few errors", "many errors"])
+def either_root(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The symmetric root of C, and the one for many errors."""
+    monkeypatch.setattr(inverse_root, "_MANY", 100 if request.param == "few errors" else 0)
+
+
+@pytest.mark.usefixtures("either_root")
 def test_whitening_gives_the_chi2_of_the_full_matrix() -> None:
     rng = np.random.default_rng(3)
     C = Covariance(rng.uniform(0.5, 2, 20), rng.normal(size=(20, 4)))
@@ -30,8 +38,10 @@ def test_whitening_gives_the_chi2_of_the_full_matrix() -> None:
     assert white @ white == pytest.approx(r @ np.linalg.solve(matrix(C), r), rel=1e-12)
     np.testing.assert_allclose(C.whiten(matrix(C)) @ C.whiten(np.eye(20)).T, np.eye(20), atol=1e-10)
     np.testing.assert_allclose(C.u_total**2, np.diag(matrix(C)), rtol=1e-12)
+    assert C.log_determinant == pytest.approx(np.linalg.slogdet(matrix(C))[1], rel=1e-12)
 
 
+@pytest.mark.usefixtures("either_root")
 def test_pulls_are_the_most_likely_shared_errors() -> None:
     """Compared with the joint normal equations of points and shared errors."""
     rng = np.random.default_rng(5)

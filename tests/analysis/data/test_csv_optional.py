@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.data.acceptance import Acceptance
-from analysis.data.csv_table import CsvTable, read_table
+from analysis.data.csv.table import CsvTable, read_table
 from instrument.errors import InputError
 from tests.support.analysis.csv_texts import problems
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.data.csv_table import read_table
+from analysis.data.csv.table import read_table
 from analysis.data.measurements import Measurements, SharedError
 from analysis.data.repeats import mean_of_repeats
 from analysis.fit.fit import fit, stated_u

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.data.csv_table import read_csv
+from analysis.data.csv.table import read_csv
 from instrument.errors import InputError
 from instrument.text import text_file
 from tests.support.analysis.csv_texts import BARE, problems, read

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.data.csv_table import read_csv
+from analysis.data.csv.table import read_csv
 from analysis.data.measurements import Measurements
 from instrument.errors import InputError
 

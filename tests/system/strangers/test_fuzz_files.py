@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import yaml
 
-from analysis.data.csv_table import read_csv
+from analysis.data.csv.table import read_csv
 from analysis.data.curet import read_curet
 from instrument.config.load import load_protocol, load_rig
 from instrument.errors import InputError

@@ -12,7 +12,7 @@ import pytest
 
 from acquisition.results.run_folder import default_folder
 from acquisition.terminal.console import EscapingConsole
-from analysis.data.csv_table import read_csv
+from analysis.data.csv.table import read_csv
 from analysis.report.data import ReportData
 from analysis.report.page import report_html
 from instrument.config.load import Loaded, load_protocol

@@ -9,7 +9,7 @@ Angles are those of `instrument/geometry.py`: theta_r_deg may be signed, and kee
 Blank lines and lines that begin with # are skipped. A quoted field may contain commas, but no line
 end. Negative values of brdf are data: noise about zero.
 
-A table may state more about its uncertainty in the columns of `csv_columns`. The measurements.csv
+A table may state more about its uncertainty in the columns of `columns`. The measurements.csv
 of a run does: fitted, it gives what the run's folder gives.
 """
 
@@ -22,11 +22,11 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.data import csv_columns as columns
 from analysis.data.acceptance import Acceptance
-from analysis.data.csv_cells import Cells
-from analysis.data.csv_columns import ANGLES, BRDF, U_BRDF
-from analysis.data.csv_header import ROWS, Header, read_header
+from analysis.data.csv import columns
+from analysis.data.csv.cells import Cells
+from analysis.data.csv.columns import ANGLES, BRDF, U_BRDF
+from analysis.data.csv.header import ROWS, Header, read_header
 from analysis.data.measurements import Measurements, setting_numbers
 from instrument.geometry import FloatArray
 from instrument.text.csv_line import QuoteError, column_of, texts_of

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import csv_columns as columns
 from analysis.data.acceptance import Acceptance
-from analysis.data.csv_header import Header
+from analysis.data.csv import columns
+from analysis.data.csv.header import Header
 from analysis.data.measurements import SharedError
 from instrument.geometry import FloatArray, IntArray
 from instrument.text.csv_column import Column

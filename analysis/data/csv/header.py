@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from analysis.data.csv_columns import COLUMNS, NEEDED, is_read, read_names
+from analysis.data.csv.columns import COLUMNS, NEEDED, is_read, read_names
 from instrument.errors import InputError
 from instrument.text.csv_line import QuoteError, fields_of
 from instrument.text.quoting import printable, shown

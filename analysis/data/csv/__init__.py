@@ -1,0 +1,1 @@
+"""CSV tables of measurements: header, columns, cells, and the measurements that they give."""
