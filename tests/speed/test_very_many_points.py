@@ -17,8 +17,8 @@ from analysis.choice.choice import Choice, choose
 from analysis.choice.ladder import functional_form
 from analysis.data.measurements import Measurements, SharedError
 from analysis.fit import first_fit
-from analysis.fit.fit import FitResult
-from analysis.models import MODELS
+from analysis.fit.fit import FitResult, fit
+from analysis.models import MODELS, Model
 from instrument.geometry import Geometry
 
 MATERIALS = ("oren_nayar", "oren_nayar+torrance_sparrow", "lambert+ggx", "minnaert", "wolff")
@@ -26,6 +26,8 @@ MATERIALS = ("oren_nayar", "oren_nayar+torrance_sparrow", "lambert+ggx", "minnae
 # its value does not matter.
 MOST_ABOVE, OUT_OF_QUESTION = 1.2, 100.0
 DEEPER = 0.999  # chi2 of a deeper minimum, as a fraction of that which the other search found
+# Time of a point among many over that of one among few: those in the processor's cache are quicker.
+MOST_A_POINT = 1.5
 BOUNDED, BOUNDED_WITH_SHARED = (1, 4), (2,)  # seeds
 FACTOR = 8  # of the number of points, from the program's limits to those of the bounded form
 
@@ -131,6 +133,24 @@ def test_so_it_is_where_points_share_errors(
 def left(choice: Choice) -> list[str]:
     """Names of the candidates that were not fitted to all points."""
     return [c.model for c in choice.candidates if c.message == first_fit.LEFT]
+
+
+def test_a_point_costs_no_more_among_many() -> None:
+    """A named model, with errors that points share: nothing of the fit grows as their square."""
+    few, many = (with_shared_errors(drawn(2, size), 2) for size in (8_000, 32_000))
+    model = MODELS[MATERIALS[2]]
+    seconds = [(time_s(model, few), time_s(model, many)) for _ in range(2)]
+    few_s, many_s = np.min(seconds, axis=0)
+    assert many_s / many.size < MOST_A_POINT * few_s / few.size
+
+
+def time_s(model: Model, m: Measurements) -> float:
+    """Time of a fit in s of processor, once it explains the data."""
+    begun_s = time.process_time()
+    found = fit(model, m)
+    spent_s = time.process_time() - begun_s
+    assert found.chi2 == pytest.approx(m.size, rel=0.1)
+    return spent_s
 
 
 def require_same_choice(quick: Choice, whole: Choice) -> None:
