@@ -14,14 +14,19 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import cache
 from io import TextIOWrapper
 from pathlib import Path
 from typing import IO
 from unittest.mock import patch
 
+from typer.main import get_command
+
 from acquisition.entry import main
 from tests.support.paths import ROOT
 
+# The tree of commands, which takes ten times as long to build as to read the arguments of one.
+_built_once = cache(get_command)
 _stop_thread_fd = [-1]  # its end of the pipe, once a command has started the thread
 
 
@@ -58,6 +63,7 @@ def gonio_here(
         stdout, stderr = (stack.enter_context(_text(n, encoding)) for n in (1, 2))
         stack.enter_context(patch.multiple(sys, stdin=nobody, stdout=stdout, stderr=stderr))
         stack.enter_context(patch.object(sys, "argv", ["gonio", *map(str, arguments)]))
+        stack.enter_context(patch("typer.main.get_command", _built_once))
         stack.enter_context(patch.dict(os.environ))
         stack.enter_context(own_signals())
         code = _exit_code()
