@@ -86,8 +86,9 @@ class Candidates:
 
     every: fit an integrated model even where its functional form is accurate enough. screen: of
     models that are fitted to a part of very many points alone, as they are far behind there: chi2
-    of all points is then known to about a hundredth, which is no reason to prefer one. None: all
-    are fitted to all points. left_out: models with too many parameters for the points.
+    of all points is then known to about a hundredth, with errors that points share within a factor
+    of two, which is no reason to prefer one. None: all are fitted to all points. left_out: models
+    with too many parameters for the points.
     """
 
     fits: FirstFits
