@@ -36,13 +36,16 @@ from tests.support.adaptive.against_sweep import (
     quick_fit,
     random_sample,
     summary,
+    ten_degrees,
 )
 from tests.support.scans import changed
 
 SAMPLES = 200
 """Samples of a whole run; the first ones are those of the paper, the others random."""
 FEW = FitConfig(models=["oren_nayar", "oren_nayar+torrance_sparrow"])
-"""Candidates of the bounded form, whose fits are quick; those of a whole run are all."""
+"""Candidates of the bounded form, whose fits are quick; those of a whole run are all.
+
+Its sweeps have steps of 10 degrees where the limits hold for them too."""
 
 
 @pytest.fixture
@@ -70,11 +73,6 @@ def _samples(count: int) -> list[tuple[int, Sample]]:
     return list(enumerate(own[:count]))
 
 
-def _sweep(slow: bool) -> Loaded:
-    """Return the sweep with all candidates, or with few."""
-    return five_degrees() if slow else changed(five_degrees(), fit=FEW)
-
-
 def _right(one: Compared) -> bool:
     return physics(one.adaptive.model) == physics(one.sample[0])
 
@@ -85,7 +83,7 @@ def test_the_same_u_takes_less_time_and_the_model_is_found_as_often(
     tmp_path: Path, slow: bool, record: Callable[..., None]
 ) -> None:
     chosen = _samples(SAMPLES) if slow else [(3, PAPER["E"])]
-    plain = _sweep(slow)
+    plain = five_degrees() if slow else changed(ten_degrees(five_degrees()), fit=FEW)
     found = [compared(sample, k, tmp_path / str(k), plain=plain) for k, sample in chosen]
     record("adaptive scans beside the sweep", found)
     ratios = [one.ratio for one in found]
@@ -113,7 +111,7 @@ def test_three_times_the_u_of_the_sweep_takes_a_third_of_its_time(
     tmp_path: Path, slow: bool, record: Callable[..., None]
 ) -> None:
     chosen = _samples(SAMPLES) if slow else [(0, PAPER["A"])]
-    plain = _sweep(slow)
+    plain = five_degrees() if slow else changed(five_degrees(), fit=FEW)
     found = [compared(s, k, tmp_path / str(k), times=3.0, plain=plain) for k, s in chosen]
     record("three times the u of the sweep", found)
     ratios = [one.ratio for one in found]
@@ -129,7 +127,8 @@ def test_where_exposures_are_long_the_same_u_takes_half_the_time(
 ) -> None:
     plain = in_dim_light()
     if not slow:  # the right model alone: its fit is quick
-        plain = changed(plain, fit=FitConfig(models=["oren_nayar+torrance_sparrow"]))
+        model = FitConfig(models=["oren_nayar+torrance_sparrow"])
+        plain = changed(ten_degrees(plain), fit=model)
     chosen = _samples(SAMPLES) if slow else [(2, PAPER["D"])]
     found = [compared(s, k, tmp_path / str(k), plain=plain) for k, s in chosen]
     record("the same u in dim light", found)

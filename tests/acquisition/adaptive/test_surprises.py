@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.adaptive.against_sweep import five_degrees, ten_degrees
 from tests.support.adaptive.surprises import KINDS, Kind, found
 
 SAMPLES = 6
@@ -26,8 +27,8 @@ def test_what_no_model_has_is_found(
     if not slow and kind != "retro peak":
         pytest.skip("takes seconds: with --slow")
     seeds = range(SAMPLES if slow else 1)
-    views = 33 if slow else 17
-    outcomes = [found(kind, seed, tmp_path / str(seed), views) for seed in seeds]
+    plain = five_degrees() if slow else ten_degrees(five_degrees())
+    outcomes = [found(kind, seed, tmp_path / str(seed), plain) for seed in seeds]
     by_sweep, adaptive = (sum(one[k] for one in outcomes) for k in (0, 1))
     parts = [round(one[2], 2) for one in outcomes]
     text = f"{adaptive} of {len(outcomes)}, by the sweep {by_sweep}; points {parts} of the sweep's"

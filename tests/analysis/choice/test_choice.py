@@ -192,8 +192,11 @@ def test_the_automatic_choice_over_the_materials(slow: bool) -> None:
 @needs_curet
 @pytest.mark.slow
 def test_no_material_gets_a_model_far_worse_than_another_candidate(slow: bool) -> None:
-    """CUReT's samples 5 and 59 had a chosen rms over 20 % above that of the best candidate."""
-    for sample in (5, 59) if slow else (59,):
+    """CUReT's samples 5 and 59 had a chosen rms over 20 % above that of the best candidate.
+
+    Without --slow that of the tests above, which is fitted already.
+    """
+    for sample in (5, 59) if slow else (49,):
         choice = of_material(sample)
         assert choice.best is not None
         assert choice.best.rms_relative < 1.2 * min(c.rms_relative for c in choice.candidates)

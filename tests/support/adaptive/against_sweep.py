@@ -18,6 +18,7 @@ from acquisition.results.reduction import reduced_rows
 from analysis.choice.choice import Choice, choose
 from analysis.choice.ladder import physics
 from instrument.config.load import Loaded
+from instrument.config.protocol import Steps
 from instrument.geometry import Brdf
 from instrument.record.reading import Rows, batches_of
 from tests.support.adaptive.predicted_bench import PredictedBench
@@ -99,6 +100,12 @@ def summary(found: Sequence[Compared]) -> dict[str, float]:
 def five_degrees() -> Loaded:
     """The demonstration: three incidences, 33 views from -80 to 80 degrees."""
     return changed(base("bench_12bit"))
+
+
+def ten_degrees(plain: Loaded) -> Loaded:
+    """Copy whose sweep has each second view."""
+    (sweep,) = plain.protocol.sweeps
+    return changed(plain, sweeps=[{**sweep, "theta_r_deg": Steps(start=-80.0, stop=80.0, num=17)}])
 
 
 def quick_fit(rows: Rows, loaded: Loaded) -> Choice:

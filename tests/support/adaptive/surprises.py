@@ -12,10 +12,11 @@ from acquisition.adaptive.candidate_list import candidate_list, with_goal
 from acquisition.adaptive.chooser import Chooser
 from acquisition.adaptive.layout import Layout
 from acquisition.plan.plan import make_plan
-from instrument.config.protocol import FitConfig, Steps
+from instrument.config.load import Loaded
+from instrument.config.protocol import FitConfig
 from instrument.geometry import Brdf, FloatArray, Geometry
 from instrument.record.reading import Rows
-from tests.support.adaptive.against_sweep import five_degrees, quick_fit
+from tests.support.adaptive.against_sweep import quick_fit
 from tests.support.adaptive.predicted_bench import SAMPLE, PredictedBench
 from tests.support.scans import TWO_MODELS, changed
 
@@ -48,17 +49,14 @@ def surprise(kind: Kind, seed: int) -> Brdf:
     return brdf
 
 
-def found(kind: Kind, seed: int, folder: Path, views: int) -> tuple[bool, bool, float]:
+def found(kind: Kind, seed: int, folder: Path, plain: Loaded) -> tuple[bool, bool, float]:
     """Say whether the sweep and an adaptive scan found that no candidate model holds.
 
     And the points of the adaptive scan as a part of the sweep's. The sample is the demonstration's
-    with the surprise; u of sigma to reach: `UNTIL`, in the bench time of the sweep, which has so
-    many views at each incidence.
+    with the surprise; u of sigma to reach: `UNTIL`, in the bench time of the sweep. plain: the
+    sweep's protocol and rig.
     """
-    plain = changed(five_degrees(), fit=FitConfig(models=TWO_MODELS.split(", ")))
-    (sweep,) = plain.protocol.sweeps
-    steps = Steps(start=-80.0, stop=80.0, num=views)
-    plain = changed(plain, sweeps=[{**sweep, "theta_r_deg": steps}])
+    plain = changed(plain, fit=FitConfig(models=TWO_MODELS.split(", ")))
     plan, extra = make_plan(plain), surprise(kind, seed)
     chooser = Chooser(Layout(plan, plain), Aims(u={}, budget_s=None, models=None, method="auto"))
     swept = PredictedBench(plain, seed, SAMPLE, chooser, extra).all_readings()

@@ -42,12 +42,14 @@ def days(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 @pytest.fixture(autouse=True)
 def few_models(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fit the samples' own model and its diffuse part, but for the first test, which fits all."""
-    if request.function is not test_days_of_one_sample_agree:
+    """Fit the samples' own model and its diffuse part; with --slow the first test fits all."""
+    first = request.function is test_days_of_one_sample_agree
+    if not (first and request.config.getoption("--slow")):
         models = ["oren_nayar", "oren_nayar+torrance_sparrow"]
         monkeypatch.setattr(compare, "choose", partial(choose, models=models))
 
 
+@pytest.mark.slow
 def test_days_of_one_sample_agree(days: list[Path]) -> None:
     done = gonio("compare", *days, "--json")
     assert done.returncode == 0, done.stderr
