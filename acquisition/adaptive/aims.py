@@ -15,7 +15,7 @@ from instrument.errors import InputError
 from instrument.text.quoting import printable
 
 MARGIN = 0.99
-"""Share of the wanted u at which it counts as reached: closing references may change it a bit."""
+"""Share of the wanted u that is aimed at: a last reading of the white tile may change it a bit."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,6 +7,7 @@ last one is measured, and no choice depends on how long that takes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -14,14 +15,14 @@ from functools import cached_property
 import numpy as np
 
 from acquisition.adaptive.aims import Aims
-from acquisition.adaptive.knowledge import Knowledge, agreeing, corrections
+from acquisition.adaptive.knowledge import Knowledge, agreeing, closed, corrections
 from acquisition.adaptive.layout import Layout
-from acquisition.adaptive.next_points import Costs, NextPoints
+from acquisition.adaptive.next_points import Costs, Counts, NextPoints
 from acquisition.design.assumed_sample import AssumedSample
 from acquisition.design.forecast import Forecaster
 from acquisition.plan.plan import Step
 from acquisition.plan.recorded_choice import steps_of
-from analysis.design.optimal import LACK_OF_FIT
+from analysis.design.optimal import LACK_OF_FIT, SHARE
 from analysis.design.space_filling import farthest_from
 from analysis.models import MODELS
 from instrument.config.axes import HandAxis
@@ -37,6 +38,10 @@ BATCH = 6
 
 _LEAST_RATIO = 0.8  # of the u of a fit over that of the forecast for the same points
 _ENTRY = 4  # points of the first batch at another setting of the lamp by hand
+
+_AHEAD = 4  # points of the way to the goal, at most, in units of those measured
+
+_PART, _REST = 0.5, 3  # of the way to the goal: part measured next, and points not left for later
 
 Chosen = list[tuple[Step, str]]
 
@@ -79,18 +84,28 @@ class Chooser:
         done = {step.index for step in known_steps}
         chosen = np.array([step.index in done for step in self.points])
         if len(batches) < 2:
-            return Proposal(points=self._opening(chosen, known_steps))
-        earlier = {step.index for step in self.steps(batches[:-1])}
+            return Proposal(points=self._opening(known_steps))
+        before = self.steps(batches[:-1])
+        earlier = {step.index for step in before}
         seen = [reading for reading in readings if reading.step in earlier]
+        seen = closed(seen, self.layout, before)
         known = Knowledge.of(seen, checks, self.layout.loaded, self.aims)
         measured = np.array([step.index in earlier for step in self.points])
         agree = known.model and agreeing(batches[-1], known.model, known.verdict)
-        size = max(BATCH, int(chosen.sum()) if agree else 0)
-        spread = [why for batch in batches for why in batch.reasons].count(LACK_OF_FIT)
+        counts = Counts(
+            batch=max(BATCH, int(chosen.sum())) if agree else BATCH,
+            way=max(BATCH, _AHEAD * int(chosen.sum())) if agree else BATCH,
+            spread=[why for batch in batches for why in batch.reasons].count(LACK_OF_FIT),
+        )
         if known.leading is not None:
             try:
                 return self._informed(
-                    known, chosen, measured, known_steps, (size, spread), corrections(batches)
+                    known,
+                    chosen,
+                    measured,
+                    known_steps,
+                    counts,
+                    corrections(batches, known.u(self.aims)),
                 )
             except (InputError, ValueError):
                 pass  # the model found so far foretells no light at all: spread on
@@ -129,14 +144,14 @@ class Chooser:
             found.append(point)
         return [(self.points[k], LACK_OF_FIT) for k in found]
 
-    def _opening(self, chosen: BoolArray, known: Sequence[Step]) -> Chosen:
+    def _opening(self, known: Sequence[Step]) -> Chosen:
         """Return the first part of points that are spread over all; then, the rest of them.
 
         Parts in the order of measuring, so that the lamp need not turn back for the second one.
         """
-        here, none = self._current(known), np.zeros(chosen.size, dtype=bool)
-        points = [step for step, _ in self._spread(none, here, FIRST + SECOND)]
-        way = self.layout.way((), points) or points
+        here = self._current(known)
+        spread = self._spread(np.zeros_like(here), here, FIRST + SECOND)
+        way = self.layout.way((), [step for step, _ in spread])
         part = way[FIRST:] if known else way[:FIRST]
         done = {step.index for step in known}
         return [(step, LACK_OF_FIT) for step in part if step.index not in done]
@@ -145,12 +160,18 @@ class Chooser:
         """Return points at the present setting of the lamp by hand, else at the next one."""
         here = self._current(known)
         if np.any(here & ~chosen):
-            return self._spread(chosen, here, size)
+            return self._in_order(self._spread(chosen, here, size), known)
         for block in self._later(known):
             found = self._spread(chosen, self._at(block), _ENTRY)
             if found:
-                return found
+                return self._in_order(found, known)
         return []
+
+    def _in_order(self, points: Chosen, known: Sequence[Step]) -> Chosen:
+        """Return points in the order in which they are measured; without those out of reach."""
+        reasons = {step.index: why for step, why in points}
+        way = self.layout.way(known, [step for step, _ in points])
+        return [(step, reasons[step.index]) for step in way]
 
     def _later(self, known: Sequence[Step]) -> list[int]:
         begun = {step.block for step in known}
@@ -162,7 +183,7 @@ class Chooser:
         chosen: BoolArray,
         measured: BoolArray,
         steps: Sequence[Step],
-        counts: tuple[int, int],
+        counts: Counts,
         factors: Mapping[str, float],
     ) -> Proposal:
         leading = known.leading
@@ -199,30 +220,54 @@ class Chooser:
         used: BoolArray,
         chosen: BoolArray,
         steps: Sequence[Step],
-        counts: tuple[int, int],
+        counts: Counts,
         ratio: Mapping[str, float],
     ) -> Chosen:
         """Return the best points here; those of a later setting by hand if they teach more.
 
-        counts: points of the batch at most, and of those for lack of fit so far. ratio: u of the
-        fit over that of the forecast.
+        ratio: u of the fit over that of the forecast.
         """
         usable = np.flatnonzero(used)
         here = (self._current(steps) & ~chosen)[used]
-        found, best = choice.pick(*counts, here, ratio) if here.any() else ([], -1.0)
+        picks, best = choice.pick(counts, here, ratio) if here.any() else ([], -1.0)
         at = None
         for block in self._later(steps):
             allowed = self._at(block)[used]
             if allowed.any():
-                picked, rate = choice.pick(*counts, allowed, ratio)
+                picked, rate = choice.pick(counts, allowed, ratio)
                 if rate > best:
-                    found, best, at = picked, rate, block
+                    picks, best, at = picked, rate, block
         if at is not None:  # begin there with points that show a lack of fit
-            return self._spread(chosen, self._at(at), _ENTRY)
-        return [
-            (replace(step, frames=step.frames * pick.multiple), pick.reason)
-            for step, pick in ((self.points[usable[pick.candidate]], pick) for pick in found)
+            return self._in_order(self._spread(chosen, self._at(at), _ENTRY), steps)
+        points = [
+            (self._with_frames(self.points[usable[pick.candidate]], pick.multiple), pick.reason)
+            for pick in picks
         ]
+        return self._first_part(points, steps, counts)
+
+    @staticmethod
+    def _with_frames(step: Step, multiple: int) -> Step:
+        return replace(step, frames=step.frames * multiple)
+
+    def _first_part(self, points: Chosen, known: Sequence[Step], counts: Counts) -> Chosen:
+        """Return the points of the way to the goal that are measured next, in their order.
+
+        Half of the way, which is then chosen anew from where the rig stands: the last batches are
+        small and follow from the most readings. Points for lack of fit that lie farther on are
+        among them where a fifth would not be.
+        """
+        way = self._in_order(points, known)
+        whole = counts.way <= BATCH or len(way) <= BATCH + _REST
+        if whole or all(why == LACK_OF_FIT for _, why in way):
+            return way
+        count = min(counts.batch, max(BATCH, math.ceil(_PART * len(way))))
+        found, later = way[:count], [one for one in way[count:] if one[1] == LACK_OF_FIT]
+        total = sum(step.kind == "point" for step in known) + count
+        spread = counts.spread + sum(why == LACK_OF_FIT for _, why in found)
+        while later and spread < SHARE * total:
+            found.append(later.pop(0))
+            total, spread = total + 1, spread + 1
+        return found
 
     def _multiples(self, known: Sequence[Step]) -> IntArray:
         """Frames of each candidate (N,) in units of the protocol's, as a ratio; 0 if not chosen."""

@@ -18,7 +18,7 @@ from acquisition.adaptive.endings import (
     stable,
     u_text,
 )
-from acquisition.adaptive.knowledge import full_fit
+from acquisition.adaptive.knowledge import closed, full_fit
 from acquisition.adaptive.layout import Layout
 from acquisition.adaptive.shadow import Shadow
 from acquisition.plan.plan import Plan, Step
@@ -97,9 +97,16 @@ class Course:
         return Shadow(task)
 
     def _decided(self, proposal: Proposal) -> Batch:
-        """Return the next batch: what is proposed, or the closing references with the reason."""
+        """Return the next batch: what is proposed, or the closing references with the reason.
+
+        The u is checked again once the drift check that closes the scan is there: it tells on it.
+        """
         checked = self._full_check(proposal)
-        if checked and self._aims.reached(checked, MARGIN):
+        closing = self._chooser.layout.closing(self.steps)
+        drift = [step for step in closing if step.kind == "drift"]
+        if checked and self._aims.reached(checked, MARGIN if closing and not drift else 1.0):
+            if drift:
+                return self._batch(proposal, drift, checked)
             return self._last(proposal, reached(self._aims, checked), checked)
         hopeless = no_help(self._batches, proposal, self._aims) if self._batches else ""
         if hopeless:
@@ -120,10 +127,12 @@ class Course:
 
     def _full_check(self, proposal: Proposal) -> dict[str, float | None]:
         """Return the u of the run's own fit where the goal may be reached; else nothing."""
-        ahead = expected(self._batches, proposal)
+        ahead = expected(self._batches, proposal, self._aims)
         if not ahead or not self._aims.reached(ahead) or not stable(self._batches, proposal):
             return {}
-        model, u = full_fit(self._record.rows(), self._chooser.layout.loaded, self._aims)
+        layout, rows = self._chooser.layout, self._record.rows()
+        rows = rows._replace(readings=closed(rows.readings, layout, self.steps))
+        model, u = full_fit(rows, layout.loaded, self._aims)
         if physics(model) != physics(proposal.known.model):
             return dict.fromkeys(u)
         return dict(u)
@@ -182,7 +191,7 @@ class Course:
             return f"end: {batch.end}"
         points = [reason for reason in batch.reasons if reason != REFERENCE]
         kinds = ", ".join(f"{points.count(k)} for {k}" for k in dict.fromkeys(points))
-        text = f"batch {batch.number + 1}: {kinds}"
+        text = f"batch {batch.number + 1}: {kinds or 'the drift check that closes the scan'}"
         if not batch.model:
             return text
         return f"{text}; {batch.model} so far, {u_text(self._aims, batch.fitted)}"

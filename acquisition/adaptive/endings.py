@@ -21,12 +21,12 @@ def stable(batches: Sequence[Batch], proposal: Proposal) -> bool:
     return bool(known.model) and agreeing(batches[-1], known.model, known.verdict)
 
 
-def expected(batches: Sequence[Batch], proposal: Proposal) -> dict[str, float | None]:
+def expected(batches: Sequence[Batch], proposal: Proposal, aims: Aims) -> dict[str, float | None]:
     """Return the forecast u, corrected by what full fits have found so far beside their forecast.
 
     They average the models over lamp and lens, and correct for what quick fits leave out.
     """
-    factors = corrections(batches)
+    factors = corrections(batches, proposal.known.u(aims))
     return {
         name: None if u is None else u * factors.get(name, 1.0)
         for name, u in proposal.forecast.items()
@@ -66,7 +66,7 @@ def reached(aims: Aims, u: U) -> str:
 def out_of_time(batches: Sequence[Batch], proposal: Proposal, aims: Aims) -> str:
     """Return that the next batch would exceed the budget."""
     minutes = (aims.budget_s or 0.0) / 60
-    u = expected(batches, proposal)
+    u = expected(batches, proposal, aims)
     missed = aims.missed(u)
     text = f"the next batch would exceed the budget of {minutes:g} min: {u_text(aims, u)}"
     name = next((n for n in missed if (proposal.floor.get(n) or 0.0) > aims.u[n]), None)
@@ -81,7 +81,7 @@ def out_of_time(batches: Sequence[Batch], proposal: Proposal, aims: Aims) -> str
 
 def all_measured(batches: Sequence[Batch], proposal: Proposal, aims: Aims) -> str:
     """Return that every candidate that can be reached is measured."""
-    u = expected(batches, proposal)
+    u = expected(batches, proposal, aims)
     return f"every candidate is measured: {u_text(aims, u)}; allow more by denser sweeps"
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from acquisition.adaptive.aims import Aims
+from acquisition.adaptive.layout import Layout
+from acquisition.plan.plan import Step
 from acquisition.results.fitting import fit_run, measurements
 from acquisition.results.reduction import reduced_rows
 from analysis.choice.choice import Choice, choose
@@ -65,17 +67,39 @@ def counted(checks: Sequence[Check]) -> Sequence[Check]:
     return checks if any(check.jumped for check in checks) else ()
 
 
+def closed(readings: Sequence[Reading], layout: Layout, known: Sequence[Step]) -> list[Reading]:
+    """Return the readings with the drift check that closes the scan, if it ended after these.
+
+    It is taken to be as the last one: the u of a fit, on which it tells, is then that of the end.
+    """
+    checks = [step for step in layout.closing(known) if step.kind == "drift"]
+    made = [reading for reading in readings if reading.kind == "drift"]
+    if not checks or not made:
+        return list(readings)
+    last = max(made, key=lambda reading: reading.time_s)
+    # Not from when the rig was free: that depends on interruptions of the scan.
+    time_s = max(reading.time_s for reading in readings) + layout.seconds(checks, known)
+    own = (replace(last, step=step.index, time_s=time_s, free_s=time_s) for step in checks)
+    return [*readings, *own]
+
+
 def agreeing(batch: Batch, model: str, verdict: str) -> bool:
     """Return True if the fit that a batch was based on chose the same physics, the same verdict."""
     return (physics(batch.model), batch.verdict) == (physics(model), verdict)
 
 
-def corrections(batches: Sequence[Batch]) -> dict[str, float]:
-    """Return the ratio of the last full fit's u to what had been forecast, 1 or more, by name."""
-    last = next((batch for batch in reversed(batches) if batch.checked), None)
-    if last is None:
+def corrections(batches: Sequence[Batch], fitted: Mapping[str, float | None]) -> dict[str, float]:
+    """Return the ratio of the last full fit's u to the quick fit's, 1 or more, by name.
+
+    Both to the same readings: the quick fit is that on which the batch after the check is based;
+    `fitted`: its u where that batch is being chosen now.
+    """
+    checks = [k for k, batch in enumerate(batches) if batch.checked]
+    if not checks:
         return {}
-    pairs = ((n, full, last.forecast.get(n)) for n, full in last.checked.items())
+    after = batches[checks[-1] + 1 :]
+    quick_u = after[0].fitted if after else fitted
+    pairs = ((n, full, quick_u.get(n)) for n, full in batches[checks[-1]].checked.items())
     return {name: max(full / quick, 1.0) for name, full, quick in pairs if full and quick}
 
 

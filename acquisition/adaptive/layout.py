@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
+from acquisition.adaptive.tour import tour
 from acquisition.plan.moves import NoPathError, moves_between
 from acquisition.plan.plan import Plan, Step, frames_s
 from acquisition.plan.pose import Pose, home_pose
@@ -29,25 +31,28 @@ class Layout:
         """Return the settings of the lamp by hand, in the order of the list."""
         return list(dict.fromkeys(step.block for step in self.plan.steps))
 
-    def batch(self, points: Iterable[Step], known: Sequence[Step]) -> list[Step]:
-        """Return the steps that measure points of one block after those known already.
+    def batch(self, way: Sequence[Step], known: Sequence[Step]) -> list[Step]:
+        """Return the steps that measure points of one block, in their order, after those known.
 
-        The block before is closed and the new one opened where they differ. Points that no way
-        leads to are left out.
+        The block before is closed and the new one opened where they differ. The points are those
+        of `way`.
         """
-        points = list(points)
-        if not points:
+        if not way:
             return []
-        block, found = points[0].block, list[Step]()
+        block = way[0].block
+        found = self._references(block, known)
+        return [*found, *self._with_drift(list(way), [*known, *found], block)]
+
+    def _references(self, block: int, known: Sequence[Step]) -> list[Step]:
+        """Return the references that come before the points of a block, after those known."""
+        found = list[Step]()
         if known and known[-1].block != block:
             found += self.closing(known)
         if all(step.block != block for step in known):
             found += self._tiles(block, known)
-        way = self.way([*known, *found], points)
-        for point in way:
-            found += self._drift_due([*known, *found], block)
-            found.append(point)
-        return found if way else []
+        if all((step.kind, step.block) != ("drift", block) for step in known):
+            found += self._next("drift", block, known, 1)
+        return found
 
     def closing(self, known: Sequence[Step]) -> list[Step]:
         """Return the last drift check of the block that is being measured, and the tile again."""
@@ -93,56 +98,55 @@ class Layout:
         return known[-1].pose if known else home_pose(self.rig)
 
     def way(self, known: Sequence[Step], points: Iterable[Step]) -> list[Step]:
-        """Return the points in an order that is quick to measure, from where the rig stands.
+        """Return points of one block in the order in which `batch` would measure them.
 
-        One setting of the lamp after the other, the nearest first, and the views of each rising or
-        falling. Points to which no way leads are left out.
+        Points to which no way leads are left out.
         """
-        settings: dict[int, list[Step]] = {}
-        for point in sorted(points, key=lambda step: (step.pose.theta_r, step.index)):
-            settings.setdefault(point.lamp_setting, []).append(point)
-        found, pose = list[Step](), self._end(known)
-        while settings:
-            orders = [order for own in settings.values() for order in (own, own[::-1])]
-            here = pose
-            taken = min(orders, key=lambda order: self._reaching_s(here, order))
-            reached = self._reached(pose, taken)
-            found += reached
-            pose = reached[-1].pose if reached else pose
-            del settings[taken[0].lamp_setting]
-        return found
-
-    def _reaching_s(self, start: Pose, order: Sequence[Step]) -> tuple[float, float]:
-        """Return the lamp's time to the setting of an order, and the time of all its moves."""
-        lamp = self.moves_s(start, order[0].pose._replace(theta_r=start.theta_r))
-        total = 0.0
-        for step in order:
-            total += self.moves_s(start, step.pose)
-            start = step.pose
-        return lamp, total
-
-    def _reached(self, start: Pose, order: Sequence[Step]) -> list[Step]:
-        """Return the steps of an order to which a way leads from the one before."""
-        found = list[Step]()
-        for step in order:
-            if self.moves_s(start, step.pose) < float("inf"):
-                found.append(step)
-                start = step.pose
-        return found
+        points = list(points)
+        if not points:
+            return []
+        before = [*known, *self._references(points[0].block, known)]
+        return tour(self._end(before), points, self.moves_s)
 
     def _tiles(self, block: int, known: Sequence[Step]) -> list[Step]:
         """Return one reading of the white tile for each setting of the lamp in a block."""
         settings = {s.lamp_setting for s in self.plan.steps if s.block == block}
         return self._next("tile", block, known, len(settings))
 
-    def _drift_due(self, known: Sequence[Step], block: int) -> list[Step]:
+    def _with_drift(self, way: list[Step], known: Sequence[Step], block: int) -> list[Step]:
+        """Return points of a block in their order, with the drift checks that fall due.
+
+        Each stands where the detour to it is the shortest, and no later than it is due.
+        """
+        drift, found = self.loaded.protocol.references.drift_check, list[Step]()
+        while drift is not None:
+            before = [*known, *found]
+            since = self._since_drift(before, block)
+            left = self._next("drift", block, before, len(self.plan.steps))
+            if since + len(way) <= drift.every_points or not left:
+                break
+            last = max(drift.every_points - since, 0)
+            first = min(int(since == 0), last) if self._spare(before, block, left) else last
+            detour_s = partial(self._detour_s, left[0], before, way)
+            taken = min(range(first, last + 1), key=detour_s)
+            found, way = [*found, *way[:taken], left[0]], way[taken:]
+        return [*found, *way]
+
+    def _spare(self, known: Sequence[Step], block: int, left: Sequence[Step]) -> bool:
+        """Return True if the drift checks left are enough to take one before it is due."""
         drift = self.loaded.protocol.references.drift_check
-        if drift is None:
-            return []
-        checked = any(step.kind == "drift" and step.block == block for step in known)
-        if checked and self._since_drift(known, block) < drift.every_points:
-            return []
-        return self._next("drift", block, known, 1)
+        every = len(self.plan.points) if drift is None else drift.every_points
+        own = sum(step.block == block for step in self.plan.points)
+        done = sum((step.kind, step.block) == ("point", block) for step in known)
+        return (len(left) - 2) * every >= own - done
+
+    def _detour_s(
+        self, check: Step, known: Sequence[Step], way: Sequence[Step], place: int
+    ) -> tuple[float, int]:
+        """Return the time of the moves to a check before the point of a place; if equal, later."""
+        before, after = (way[place - 1] if place else known[-1]).pose, way[place].pose
+        around_s = self.moves_s(before, check.pose) + self.moves_s(check.pose, after)
+        return round(around_s - self.moves_s(before, after), 6), -place
 
     @staticmethod
     def _since_drift(known: Sequence[Step], block: int) -> int:

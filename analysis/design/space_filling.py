@@ -44,6 +44,18 @@ def farthest_from(geometry: Geometry, chosen: BoolArray, allowed: BoolArray) -> 
     return int(np.argmax(np.where(free, np.round(apart / _SAME), -np.inf)))
 
 
+def nearest_to(
+    one: Geometry, geometry: Geometry, chosen: BoolArray, allowed: BoolArray
+) -> int | None:
+    """Return the geometry, of those allowed (N,) and not chosen (N,), nearest to a single one.
+
+    The masks have no unit. None where all that are allowed are chosen.
+    """
+    free = allowed & ~chosen
+    apart = np.round(_squared(_places(geometry), _places(one)[0]) / _SAME)
+    return int(np.argmin(np.where(free, apart, np.inf))) if free.any() else None
+
+
 def _places(geometry: Geometry) -> FloatArray:
     """Unit vectors to lamp and camera, (N, 6), with the lamp in one plane for all."""
     camera = lamp_direction(geometry.theta_r_deg, geometry.dphi_deg)  # polar angle and azimuth

@@ -52,7 +52,7 @@ def test_after_stops_at_random_steps_choices_and_readings_are_the_same(
     assert {reading.step: reading.frames for reading in readings} == frames
     assert len(readings) < len(chooser.layout.plan.steps)
     stops = np.random.default_rng(3).choice(len(steps) - 1, 3, replace=False)
-    last = [batch.steps[-1] for batch in batches][1]  # between two batches, too
+    last = batches[1].steps[-1]  # between two batches, too
     with _new(chooser, tmp_path / "stopped") as record:
         for place in sorted({*stops.tolist(), steps.index(last)}):
             _scan(chooser, record, steps[place])

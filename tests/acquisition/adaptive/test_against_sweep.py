@@ -1,14 +1,13 @@
 """Bench time beside the even sweep of 5 degrees, for the same u of sigma and the same errors.
 
 Homing, the operator's swaps, darks and readings of tile and lamp are in neither time. Measured with
-nine samples (those of the paper, four random ones); `SAMPLES` is how many a whole run takes:
+14 samples (those of the paper, nine random ones); `SAMPLES` is how many a whole run takes:
 
-- On the demonstration's rig, for the u of all 96 points of the sweep: median of the ratio 0.90
-  (0.86 to 1.03), 53 points. For three times that u 0.31 (0.28 to 0.32), 11 to 13 points. Noise is
-  small there, so that no point can stand for many, and most of a point's time is its way: to cross
-  the views at three incidences once takes 0.15 of the sweep's time.
-- In dim light, where the time is that of exposures: 0.50 (0.33 to 0.69; 1.67 for one sample, whose
-  u its own scatter had widened beyond that of the sweep), for twice the u of the sweep 0.17.
+- On the demonstration's rig, for the u of all 96 points of the sweep: median of the ratio 0.74
+  (0.66 to 0.91), 47 points. Noise is small there, so that no point can stand for many, and most of
+  a point's time is its way: to cross the views at three incidences once takes 0.15 of the sweep's
+  time, and the best plan for a sample that is known beforehand 0.50 (A) to 0.64 (D).
+- In dim light, where the time is that of exposures: 0.49 (0.37 to 0.64).
 - The right model each time.
 """
 
@@ -87,8 +86,8 @@ def test_the_same_u_takes_less_time_and_the_model_is_found_as_often(
     found = [compared(sample, k, tmp_path / str(k), plain=plain) for k, sample in chosen]
     record("adaptive scans beside the sweep", found)
     ratios = [one.ratio for one in found]
-    assert np.median(ratios) < (1.0 if slow else 1.15)
-    assert max(ratios) < 2.0
+    assert np.median(ratios) < 0.85
+    assert max(ratios) < (1.2 if slow else 1.0)
     right, by_sweep = (sum(map(test, found)) for test in (_right, _right_by_sweep))
     assert right >= by_sweep - 2 * np.sqrt(len(found))
     for one in found:
@@ -132,4 +131,4 @@ def test_where_exposures_are_long_the_same_u_takes_half_the_time(
     chosen = _samples(SAMPLES) if slow else [(2, PAPER["D"])]
     found = [compared(s, k, tmp_path / str(k), plain=plain) for k, s in chosen]
     record("the same u in dim light", found)
-    assert np.median([one.ratio for one in found]) < 0.65
+    assert np.median([one.ratio for one in found]) < 0.6

@@ -120,9 +120,12 @@ class PredictedBench:
     def _drawn(self, r: Reading, frames: int) -> Reading:
         u_noise_dn = r.u_noise_dn * np.sqrt(r.frames / frames)
         r = replace(r, frames=frames, u_noise_dn=float(u_noise_dn))
-        own = [r.u_noise_dn, r.u_quantisation_dn, r.u_texture_dn]
         signal = r.signal_dn * self._by_angles(r) * self._by_tile(r)
-        signal += sum(u * self._random("own", r.step, n) for n, u in enumerate(own))
+        signal += r.u_noise_dn * self._random("noise", r.step)
+        # Rounding and texture are the same each time at one geometry: at checks of the drift, too.
+        at = (r.surface, r.theta_i_deg, r.theta_r_deg, r.dphi_deg)
+        signal += r.u_quantisation_dn * self._random("rounding", *at)
+        signal += r.u_texture_dn * self._random("texture", *at)
         signal += r.u_dark_dn * self._random("dark", r.exposure_s)
         signal += r.u_placement_dn * self._random("placement", r.surface)
         return replace(r, signal_dn=float(signal))
