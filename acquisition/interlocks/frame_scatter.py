@@ -36,7 +36,8 @@ FLAG = "frames differ"
 # is seen in none of 50 million sound readings. SEEN_SIGMA is the one that raises u.
 _SURE_SIGMA = 5.5
 _LOW_TAIL = 0.16  # probability that so small a scatter is seen by chance: one standard deviation
-_RECENT = 8  # readings
+RECENT = 8
+"""Last readings that tell a flicker that comes and goes."""
 # Variance of a pixel relative to the rig file's: 16 of read noise where the true full well is a
 # quarter. More is no noise, but a frame that differs.
 _MOST_NOISE = 20.0
@@ -82,6 +83,10 @@ class Scatter:
         """True for a reading to flag: its frames surely differ by more than is allowed."""
         return self.ratio > chi_squared_limit(self.freedom, _SURE_SIGMA)
 
+    def surely_exceeds(self, share: float) -> bool:
+        """Return whether a share, 0 to 1, of what is allowed surely leaves some unexplained."""
+        return self.explained(share).noise_ratio > chi_squared_limit(self.freedom, SEEN_SIGMA)
+
     def explained(self, share: float) -> Scatter:
         """Return a copy in which a share, 0 to 1, of what is allowed counts as pixel noise."""
         variance = self.pixel_variance + share * self.allowed_variance
@@ -120,22 +125,63 @@ class _Sums:
 
         A bound, as two frames alone may agree by chance; the more readings, the closer it is.
         """
-        if self.noise_ratio <= chi_squared_limit(self.freedom, SEEN_SIGMA):
+        return self._share_of(self._bound) if self._seen else 0.0
+
+    @property
+    def mean_share(self) -> float:
+        """What is seen beyond pixel noise, as a share, 0 to 1, of what is allowed.
+
+        Its variance is known by so many degrees of freedom, so it counts as that of Student's t
+        (JCGM 101:2008, 6.4.9.4); with few of them the bound is the smaller value.
+        """
+        if not self._seen:
             return 0.0
+        spare = self.freedom - 2
+        factor = self.freedom / spare if spare > 0 else math.inf
+        return self._share_of(min(self._bound, factor * self.squares))
+
+    @property
+    def _seen(self) -> bool:
+        return self.noise_ratio > chi_squared_limit(self.freedom, SEEN_SIGMA)
+
+    @property
+    def _bound(self) -> float:
         from scipy.special import chdtri  # heavy: no quiet scan needs it
 
-        bound = self.squares * self.freedom / float(chdtri(self.freedom, 1 - _LOW_TAIL))
-        excess = max(bound - self.pixel_variance, 0.0)
+        return self.squares * self.freedom / float(chdtri(self.freedom, 1 - _LOW_TAIL))
+
+    def _share_of(self, squares: float) -> float:
+        excess = max(squares - self.pixel_variance, 0.0)
         return 1.0 if excess >= self.allowed_variance else excess / self.allowed_variance
 
 
 def flicker_share(readings: Iterable[Scatter]) -> float:
     """Return the share, 0 to 1, of the allowed variance that all readings of a scan show.
 
-    Readings whose frames differ do not count; the worst of the others stands by itself.
+    Readings whose frames differ do not count, nor does the worst of the others where it surely
+    scatters by more than those.
     """
+    several = _by_scatter(readings)
+    sums = _Sums.of(several[:-1])
+    for worst in several[-1:]:
+        if not worst.surely_exceeds(sums.share):
+            sums.add(worst)
+    return sums.mean_share
+
+
+def surely_more(own: Scatter, around: Iterable[Scatter], share: float) -> bool:
+    """Return whether a reading, or those around it, surely scatter by more than a share explains.
+
+    The share, 0 to 1, is of the allowed variance. The worst of those around stands by itself.
+    """
+    others = _by_scatter(around)[:-1]
+    return own.surely_exceeds(share) or _Sums.of(one.explained(share) for one in others).share > 0
+
+
+def _by_scatter(readings: Iterable[Scatter]) -> list[Scatter]:
+    """Return the readings of several frames that do not differ too much, the worst last."""
     several = [one for one in readings if one.freedom and not one.differs]
-    return _Sums.of(sorted(several, key=lambda one: one.mean_ratio)[:-1]).share
+    return sorted(several, key=lambda one: one.mean_ratio)
 
 
 def scatter_of(reading: Reading, rig: Rig) -> Scatter:
@@ -193,7 +239,7 @@ class FrameScatter:
 
     rig: Rig
     note: Callable[[str], None]
-    _recent: deque[Scatter] = field(default_factory=lambda: deque(maxlen=_RECENT))
+    _recent: deque[Scatter] = field(default_factory=lambda: deque(maxlen=RECENT))
     # All readings that were not flagged; the worst of them stands by itself.
     _so_far: _Sums = field(default_factory=_Sums)
     _worst: Scatter | None = None
@@ -255,7 +301,7 @@ class FrameScatter:
         known += _Sums.of(one.explained(known) for one in self._without_worst()).share
         variance = min(known, 1.0) * found.allowed_variance
         rest = found.explained(min(known, 1.0))
-        if rest.noise_ratio > chi_squared_limit(found.freedom, SEEN_SIGMA):
+        if rest.surely_exceeds(0.0):
             return max(found.squares / found.freedom - found.pixel_variance, variance)
         return variance
 
