@@ -68,8 +68,9 @@ def test_deviations_on_a_real_bench_have_the_size_of_their_u(
     """Mean, standard deviation and coverage of (value - truth) / u, by band and by parameter.
 
     `--slow`: 600 runs of each sample, as 150 tell a parameter's mean to 0.08 u only, within the
-    limits that are asked of them; `--junitxml` shows the figures. The points of a run share most
-    errors. Otherwise a few runs, in which nothing is far off.
+    limits that are asked of them, at the precision of these: 600 runs tell a coverage to 0.7 %.
+    `--junitxml` shows the figures. The points of a run share most errors. Otherwise a few runs, in
+    which nothing is far off.
     """
     found = _pulls(tmp_path, _RUNS if slow else _FEW)
     wrong: list[tuple[str, float, float, float]] = []
@@ -77,7 +78,8 @@ def test_deviations_on_a_real_bench_have_the_size_of_their_u(
         mean, sd = float(np.mean(own)), float(np.std(own))
         covered = float(np.mean(np.abs(own) < _COVERED))
         record_property(name, f"mean {mean:+.2f} u, sd {sd:.2f} u, within 1.96 u {covered:.1%}")
-        if slow and not (abs(mean) <= 0.15 and 0.88 <= sd <= 1.12 and 0.93 <= covered <= 0.97):
+        asked = abs(round(mean, 2)) <= 0.15, 0.88 <= round(sd, 2) <= 1.12
+        if slow and not (all(asked) and 0.93 <= round(covered, 2) <= 0.97):
             wrong.append((name, round(mean, 2), round(sd, 2), round(covered, 3)))
         if np.max(np.abs(own)) > 6:
             wrong.append((name, mean, sd, float(np.max(np.abs(own)))))
