@@ -20,6 +20,9 @@ from typing import Literal, Protocol
 
 from instrument.closeable import Closeable
 
+# A driver whose stop was not confirmed opens its port again for 2 s.
+_NUMBER_KEPT_S = 4.0
+
 FaultName = Literal["drop", "delay", "late", "garbage", "truncate", "nul", "lose request", "unplug"]
 
 
@@ -132,8 +135,9 @@ _CORRUPT: dict[str, Callable[[bytes], bytes]] = {
 class PtyWire(Wire):
     """Serial port on a pseudo-terminal; the master opens `port`.
 
-    An unplugged port is gone, but no other gets its number before `close`: a driver would send the
-    stop that it still owes to whatever device has that number next.
+    An unplugged port is gone, but no other gets its number before `close`, nor for a few seconds
+    after it: a driver would send the stop that it still owes to whatever device has that number
+    next.
     """
 
     def __init__(self, controllers: Sequence[Controller]) -> None:
@@ -160,10 +164,13 @@ class PtyWire(Wire):
             os.write(self._master, data)
 
     def close(self) -> None:
-        """Remove the port, end the thread and give up the port's number."""
+        """Remove the port, end the thread and, a few seconds later, give up the port's number."""
         super().close()
-        with self._descriptors:
-            self._slave = _closed(self._slave)
+        if self._slave >= 0:
+            giving_up = threading.Timer(_NUMBER_KEPT_S, os.close, [self._slave])
+            giving_up.daemon = True
+            giving_up.start()
+            self._slave = -1
 
     def _unplug(self) -> None:
         with self._descriptors:
