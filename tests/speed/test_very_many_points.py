@@ -85,22 +85,34 @@ def with_shared_errors(m: Measurements, seed: int) -> Measurements:
     )  # fmt: skip
 
 
+Comparison = Callable[[Callable[[int], Measurements]], Compared]
+
+
+@pytest.fixture
+def comparison(
+    slow: bool, monkeypatch: pytest.MonkeyPatch, record_property: Callable[[str, object], None]
+) -> Comparison:
+    """Compare both searches in points that are drawn; their number is that of the form."""
+    factor = 1 if slow else FACTOR
+    very_many, part = first_fit._VERY_MANY // factor, first_fit._PART // factor
+
+    def compare(draw: Callable[[int], Measurements]) -> Compared:
+        found = compared(draw(2 * very_many), very_many, part, monkeypatch)
+        record_property("time of the search with all points", found.whole_s / found.quick_s)
+        require_same_choice(found.quick, found.whole)
+        return found
+
+    return compare
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_the_choice_is_that_of_a_search_with_all_points(
-    seed: int,
-    slow: bool,
-    monkeypatch: pytest.MonkeyPatch,
-    record_property: Callable[[str, object], None],
+    seed: int, slow: bool, comparison: Comparison
 ) -> None:
-    very_many, part = first_fit._VERY_MANY, first_fit._PART
     if not slow and seed not in BOUNDED:
         pytest.skip("with --slow")
-    if not slow:
-        very_many, part = very_many // FACTOR, part // FACTOR
-    found = compared(drawn(seed, 2 * very_many), very_many, part, monkeypatch)
-    record_property("time of the search with all points", found.whole_s / found.quick_s)
-    require_same_choice(found.quick, found.whole)
+    found = comparison(lambda size: drawn(seed, size))
     assert left(found.quick)
     shown = {c.model: c.chi2 or 0.0 for c in found.quick.candidates}
     least = min(c.chi2 or 0.0 for c in found.whole.candidates)
@@ -112,21 +124,10 @@ def test_the_choice_is_that_of_a_search_with_all_points(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
-def test_so_it_is_where_points_share_errors(
-    seed: int,
-    slow: bool,
-    monkeypatch: pytest.MonkeyPatch,
-    record_property: Callable[[str, object], None],
-) -> None:
-    very_many, part = first_fit._VERY_MANY, first_fit._PART
+def test_so_it_is_where_points_share_errors(seed: int, slow: bool, comparison: Comparison) -> None:
     if not slow and seed not in BOUNDED_WITH_SHARED:
         pytest.skip("with --slow")
-    if not slow:
-        very_many, part = very_many // FACTOR, part // FACTOR
-    m = with_shared_errors(drawn(seed, 2 * very_many), seed)
-    found = compared(m, very_many, part, monkeypatch)
-    record_property("time of the search with all points", found.whole_s / found.quick_s)
-    require_same_choice(found.quick, found.whole)
+    found = comparison(lambda size: with_shared_errors(drawn(seed, size), seed))
     assert left(found.quick) or seed % 2
 
 

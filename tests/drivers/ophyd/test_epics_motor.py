@@ -7,7 +7,6 @@ show a transport (Channel Access, PV Access) or a record that behaves otherwise 
 from __future__ import annotations
 
 import random
-import threading
 from collections.abc import Iterator
 from contextlib import closing
 from typing import TYPE_CHECKING
@@ -15,10 +14,11 @@ from typing import TYPE_CHECKING
 import pytest
 
 from drivers.factory import open_ophyd
-from drivers.stages.motor_stage import MotorStage, Stopped
+from drivers.stages.motor_stage import MotorStage
 from instrument.clock import SystemClock
 from instrument.config.axes import OphydAxis
 from instrument.errors import DeviceError
+from tests.support.facility.stopped_move import stopped_position_deg
 
 pytest.importorskip("ophyd_async", reason="ophyd-async is not installed")
 from ophyd_async.core import get_mock_put, set_mock_value
@@ -86,13 +86,7 @@ def test_limits_of_the_rig_file_and_of_the_record_hold(stage: MotorStage) -> Non
 def test_a_stop_from_another_thread_reaches_the_record_in_the_midst_of_a_move() -> None:
     with closing(opened(speed=20.0)) as stage:
         stage.home()
-        stage.start_move(45.0)
-        stopper = threading.Thread(target=stage.stop)
-        stopper.start()
-        with pytest.raises(Stopped, match="theta_r: stopped at"):
-            stage.wait()
-        stopper.join(10.0)
-        at_deg = stage.position_deg()
+        at_deg = stopped_position_deg(stage, 45.0)
         assert record().stops >= 1
         assert at_deg < 30.0
         stage.start_move(at_deg + 0.5)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 import re
-import threading
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -14,11 +13,12 @@ from pydantic import ValidationError
 
 from acquisition.rig import OpenRig
 from drivers.factory import open_ophyd
-from drivers.stages.motor_stage import MotorStage, Stopped
+from drivers.stages.motor_stage import MotorStage
 from instrument.clock import SystemClock
 from instrument.config.axes import OphydAxis
 from instrument.config.load import load_rig
 from instrument.errors import DeviceError
+from tests.support.facility.stopped_move import stopped_position_deg
 from tests.support.paths import CONFIGS
 
 pytest.importorskip("ophyd_async", reason="ophyd-async is not installed")
@@ -63,13 +63,7 @@ def test_limits_of_the_rig_file_hold(stage: MotorStage) -> None:
 def test_a_stop_from_another_thread_ends_a_move_and_the_next_one_begins() -> None:
     with closing(opened(axis(speed=20.0))) as stage:
         stage.home()
-        stage.start_move(80.0)
-        stopper = threading.Thread(target=stage.stop)
-        stopper.start()
-        with pytest.raises(Stopped, match="theta_r: stopped at"):
-            stage.wait()
-        stopper.join(10.0)
-        at_deg = stage.position_deg()
+        at_deg = stopped_position_deg(stage, 80.0)
         assert at_deg < 40.0
         stage.start_move(at_deg + 0.5)
         assert stage.wait() == pytest.approx(at_deg + 0.5)
