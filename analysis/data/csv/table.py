@@ -9,8 +9,8 @@ Angles are those of `instrument/geometry.py`: theta_r_deg may be signed, and kee
 Blank lines and lines that begin with # are skipped. A quoted field may contain commas, but no line
 end. Negative values of brdf are data: noise about zero.
 
-A table may state more about its uncertainty in the columns that `columns` lists. The measurements.csv
-of a run does: fitted, it gives what the run's folder gives.
+A table may state more about its uncertainty in the columns that `columns` lists. The
+measurements.csv of a run does: fitted, it gives what the run's folder gives.
 """
 
 from __future__ import annotations
