@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import subprocess
 import warnings
 from collections.abc import Iterator
@@ -109,6 +110,19 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
             started = SimpleTiledServer(tmp_path_factory.mktemp("tiled"))
         yield started
         started.close()
+        _close_logs()
+
+
+def _close_logs() -> None:
+    """Close the files to which the server's loggers write: it leaves them open.
+
+    Another server in this process would drop them, and Python warn there.
+    """
+    for name in list(logging.root.manager.loggerDict):
+        for handler in list(logging.getLogger(name).handlers):
+            if isinstance(handler, logging.FileHandler):
+                logging.getLogger(name).removeHandler(handler)
+                handler.close()
 
 
 def _tiled_here(command: list[str], **_: object) -> subprocess.CompletedProcess[bytes]:
