@@ -6,11 +6,13 @@ takes a second program's settings before it refuses the stream.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import logging
 import os
 import tempfile
 from pathlib import Path
+from typing import Protocol
 from urllib.parse import quote
 
 from instrument.closeable import Closeable
@@ -56,6 +58,24 @@ class DeviceLock(Closeable):
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is not None:
             os.close(descriptor)
+
+
+class HasFileno(Protocol):
+    """Open port or socket."""
+
+    def fileno(self) -> int:
+        """Return its file descriptor."""
+        ...
+
+
+def unlock(port: HasFileno) -> None:
+    """End the lock on a port that is about to be closed.
+
+    Closing alone leaves the port locked while another thread still waits for its bytes, and it
+    could not be opened again at once.
+    """
+    with contextlib.suppress(OSError, ValueError):  # it is gone, or has no lock
+        fcntl.flock(port, fcntl.LOCK_UN)
 
 
 def _lock_file(device: str) -> int | None:

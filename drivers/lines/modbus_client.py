@@ -17,6 +17,7 @@ import serial
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException, ModbusIOException
 
+from drivers.lines.device_lock import unlock
 from drivers.lines.serial_line import ECHO, WRITE_S
 from instrument.clock import Clock
 from instrument.devices import REPLY_S
@@ -52,6 +53,7 @@ class _DeadlineClient:
         """Close the connection; safe to call twice."""
         port, self.socket = self.socket, None
         if port is not None:
+            unlock(port)
             port.close()
 
     def recv(self, _size: int | None) -> bytes:

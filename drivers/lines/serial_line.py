@@ -16,6 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from drivers.lines.device_lock import unlock
 from drivers.lines.priority_lock import PriorityLock
 from instrument.clock import Clock
 from instrument.closeable import Closeable
@@ -136,7 +137,9 @@ class Line(Closeable):
     def close(self) -> None:
         """Close the port; safe to call twice."""
         self._closed = True
-        self._release(self._serial)
+        with self._opening:  # a stop that is just opening the port anew has finished
+            port = self._serial
+        self._release(port)
 
     def _release(self, port: serial.Serial | None) -> None:
         with self._opening:
@@ -144,6 +147,7 @@ class Line(Closeable):
                 return  # closed already, or opened anew by another thread
             self._serial = None
         with contextlib.suppress(OSError, termios.error):  # gone already
+            unlock(port)
             port.close()
 
     def write(self, data: bytes) -> None:
@@ -298,8 +302,6 @@ class Line(Closeable):
     def _on_port(self, action: Callable[[serial.Serial], T]) -> T:
         port = self._serial
         if port is None:
-            if self._closed:
-                raise PortClosed(f"{self.who}: {self.port}: it was closed by this program")
             raise self._gone("it was lost")
         try:
             return action(port)
@@ -308,6 +310,8 @@ class Line(Closeable):
             raise self._gone(str(error)) from error
 
     def _gone(self, why: str) -> PortGone:
+        if self._closed:
+            return PortClosed(f"{self.who}: {self.port}: it was closed by this program")
         return PortGone(
             f"{self.who}: {self.port} is gone ({why}): look at its USB plug and its power"
             f"{'' if self._follows_device else BY_ID}, then go on"

@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import os
 import subprocess
 import sys
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+from unittest.mock import Mock
 
 import pytest
+import serial
 
 from drivers.factory import Lines
 from drivers.lines import device_lock
 from drivers.lines.device_lock import DeviceInUse, DeviceLock
-from drivers.lines.modbus_client import BusSettings
+from drivers.lines.modbus_client import BusSettings, SerialClient, client_for
+from drivers.lines.serial_line import Line, PortClosed, PortGone
 from instrument.clock import SystemClock
+from sim.emulated.wire import PtyWire
 from tests.support.paths import ROOT
+from tests.support.stages.waiting import wait_until
 
 HOLD = """
 import sys
@@ -79,6 +88,72 @@ def test_a_port_that_does_not_open_is_free_again(tmp_path: Path) -> None:
         for _ in range(2):
             with pytest.raises(Exception, match="cannot open"):
                 lines.serial("theta_r", port, 57600, 0.15)
+
+
+@pytest.fixture
+def port() -> Iterator[str]:
+    """A serial port at which nothing answers."""
+    with PtyWire([]) as wire:
+        yield wire.port
+
+
+def open_line(port: str) -> Line:
+    return Line("theta_r", port, 57600, SystemClock())
+
+
+def open_bus(port: str) -> SerialClient:
+    client = client_for(BusSettings(port, parity="N"), SystemClock())
+    assert client.connect()
+    assert isinstance(client, SerialClient)
+    return client
+
+
+@pytest.mark.parametrize("opened", [open_line, open_bus])
+def test_a_closed_port_is_free_though_a_thread_still_waits_for_its_bytes(
+    port: str, opened: Callable[[str], Line | SerialClient]
+) -> None:
+    """A copy of its descriptor stands for that thread: the system keeps the port open for both."""
+    line = opened(port)
+    with pytest.raises(OSError, match="exclusively lock"):
+        serial.Serial(port, exclusive=True)
+    copies = [os.dup(descriptor) for descriptor in descriptors_of(port)]
+    line.close()
+    opened(port).close()
+    for copy in copies:
+        os.close(copy)
+
+
+def descriptors_of(path: str) -> list[int]:
+    links = [link for link in Path("/proc/self/fd").iterdir() if link.is_symlink()]
+    return [int(link.name) for link in links if str(link.readlink()) == path]
+
+
+def test_a_line_that_is_closed_while_it_is_opened_anew_keeps_no_port(
+    port: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    line, open_port = open_line(port), serial.serial_for_url
+    closing = threading.Thread(target=line.close)
+    with monkeypatch.context() as patched:
+        patched.setattr(serial.Serial, "write", Mock(side_effect=OSError("unplugged")))
+        with pytest.raises(PortGone):
+            line.write(b"1TS")
+
+    def open_and_close(*args: Any, **options: Any) -> serial.Serial:
+        closing.start()
+        wait_until(lambda: "closed by this program" in error_of_writing(line))
+        return open_port(*args, **options)
+
+    monkeypatch.setattr(serial, "serial_for_url", open_and_close)
+    with contextlib.suppress(PortClosed):  # unless the stop was sent before
+        line.write_at_once(b"1ST")
+    closing.join(timeout=5.0)
+    serial.Serial(port, exclusive=True).close()
+
+
+def error_of_writing(line: Line) -> str:
+    with pytest.raises(PortGone) as raised:
+        line.write(b"")
+    return str(raised.value)
 
 
 def test_without_a_place_for_locks_that_is_said(
