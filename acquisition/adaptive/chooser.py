@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from acquisition.adaptive.aims import Aims
-from acquisition.adaptive.knowledge import Knowledge, agreeing, closed, corrections
+from acquisition.adaptive.knowledge import Knowledge, agreeing, closed, corrections, usual_model
 from acquisition.adaptive.layout import Layout
 from acquisition.adaptive.next_points import Costs, Counts, NextPoints
 from acquisition.design.assumed_sample import AssumedSample
@@ -89,9 +89,11 @@ class Chooser:
         earlier = {step.index for step in before}
         seen = [reading for reading in readings if reading.step in earlier]
         seen = closed(seen, self.layout, before)
-        known = Knowledge.of(seen, checks, self.layout.loaded, self.aims)
+        former = usual_model(batches)
+        known = Knowledge.of(seen, checks, self.layout.loaded, self.aims, former)
         measured = np.array([step.index in earlier for step in self.points])
-        agree = known.model and agreeing(batches[-1], known.model, known.verdict)
+        settled = known.model and not known.contested
+        agree = settled and agreeing(batches[-1], known.model, known.verdict)
         counts = Counts(
             batch=max(BATCH, int(chosen.sum())) if agree else BATCH,
             way=max(BATCH, _AHEAD * int(chosen.sum())) if agree else BATCH,

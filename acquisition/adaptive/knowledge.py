@@ -17,12 +17,15 @@ from instrument.config.load import Loaded
 from instrument.errors import GonioError
 from instrument.record.reading import Batch, Check, Reading, Rows
 
+_VERY_STRONG = 10.0  # difference of BIC: Kass and Raftery 1995, section 3.2
+
 
 @dataclass(frozen=True, slots=True)
 class Knowledge:
     """Choice of a model so far; `choice` is None where the readings are too few for any fit.
 
-    leading: the candidate that describes the data best among those with the parameters asked for.
+    leading: the candidate that the next points are for, of those with the parameters asked for: the
+    chosen one, or the one that was chosen most often before, while the data hardly contradict it.
     """
 
     choice: Choice | None = None
@@ -30,23 +33,35 @@ class Knowledge:
 
     @classmethod
     def of(
-        cls, readings: Sequence[Reading], checks: Sequence[Check], loaded: Loaded, aims: Aims
+        cls,
+        readings: Sequence[Reading],
+        checks: Sequence[Check],
+        loaded: Loaded,
+        aims: Aims,
+        former: str = "",
     ) -> Knowledge:
-        """Fit the candidates quickly: models are not averaged over lamp and lens."""
+        """Fit the candidates quickly: models are not averaged over lamp and lens.
+
+        former: model that was chosen most often before.
+        """
         try:
             m = measurements(reduced_rows(Rows(readings, counted(checks), ()), loaded), loaded)
             choice = choose(m, None, aims.models, method=aims.method)
         except (GonioError, ValueError):
             return cls()  # too few, or all flagged: there is nothing to go by yet
         able = [c for c in choice.candidates if set(aims.u) <= set(c.u) and c.converged]
-        chosen = [c for c in able if c.model == choice.chosen]
-        best = chosen[0] if chosen else min(able, key=lambda c: c.bic, default=None)
-        return cls(choice, best)
+        return cls(choice, _leading(able, choice.chosen or "", former))
 
     @property
     def model(self) -> str:
         """Name of the chosen model, empty without one."""
         return "" if self.choice is None else self.choice.chosen or ""
+
+    @property
+    def contested(self) -> bool:
+        """True if another model than the leading one is chosen."""
+        leads = self.leading is not None and physics(self.leading.model)
+        return bool(self.model and leads and leads != physics(self.model))
 
     @property
     def verdict(self) -> str:
@@ -57,6 +72,24 @@ class Knowledge:
         """Return the u of each parameter asked for; None where the chosen model gives none."""
         best = None if self.choice is None else self.choice.best
         return {name: None if best is None else best.u.get(name) for name in aims.u}
+
+
+def _leading(able: Sequence[FitResult], chosen: str, former: str) -> FitResult | None:
+    """Return the former leader, if no very strong evidence is against it, else the chosen one.
+
+    By chance another model is chosen for a batch or two; points for that one would be wasted.
+    """
+    least = min((c.bic for c in able), default=0.0)
+    kept = [c for c in able if physics(c.model) == physics(former) and c.bic < least + _VERY_STRONG]
+    best = kept or [c for c in able if c.model == chosen] or able
+    return min(best, key=lambda c: c.bic, default=None)
+
+
+def usual_model(batches: Sequence[Batch]) -> str:
+    """Return the model that was chosen for most batches, of equally many the later one."""
+    models = [batch.model for batch in batches if batch.model]
+    own = [physics(model) for model in models]
+    return max(reversed(models), key=lambda model: own.count(physics(model)), default="")
 
 
 def counted(checks: Sequence[Check]) -> Sequence[Check]:

@@ -1,32 +1,29 @@
 """Next points of an adaptive scan: those that teach most in each second of bench time.
 
-One point of a batch may tell the leading models apart; as many as make up a fifth of the scan are
-for lack of fit, the farthest from all before them; the others lower the u of the parameters asked
-for. Where noise is most of what is left and the way to a point takes longer than its frames, these
-take more of them.
+One point of a batch may tell the leading models apart, more of them where the choice has changed;
+as many as make up a fifth of the scan are for lack of fit, the farthest from all before them; the
+others lower the u of the parameters asked for. Where noise is most of what is left and the way to a
+point takes longer than its frames, these take more of them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from acquisition.adaptive.aims import MARGIN, Aims
 from acquisition.adaptive.knowledge import Knowledge
+from acquisition.adaptive.rival_models import CONTESTED, rivals_of, telling_apart
 from acquisition.design.forecast import Forecast
 from acquisition.results.effects.lamp_level import DRIFT, WANDER
-from analysis.choice.ladder import physics
 from analysis.data.covariance import VIEW
 from analysis.design.information import Information
 from analysis.design.optimal import LACK_OF_FIT, RIVALS, SHARE
 from analysis.design.posterior import Posterior
-from analysis.design.rivals import MOST as MOST_RIVALS
-from analysis.design.rivals import Rival
 from analysis.design.space_filling import farthest_from, nearest_to
-from analysis.fit.fit import FitResult
 from instrument.geometry import BoolArray, FloatArray, Geometry, IntArray
 
 MOST = 8
@@ -34,7 +31,6 @@ MOST = 8
 
 _ALONE = 4  # settings of the lamp, the nearest, at which a batch may stay
 _BEYOND = 1e-3  # weight of a variance that is as small as asked
-_TOLD = 100.0  # chi2, to first order, beyond which a point more need not tell two models apart
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +122,8 @@ class NextPoints:
         self._posterior = Posterior(self._by_frames(self._dwell), self._weights, self._chosen)
         self._doubted = known.verdict == "none adequate"
         self._worst = _worst(known)
-        self._rivals = list(_rivals(known, every))
+        self._rivals = list(rivals_of(known, every))
+        self._apart = CONTESTED if known.contested else 1
         self.asked = [n for n in self._information.names if n in aims.u]
 
     def _by_view(self) -> FloatArray:
@@ -169,10 +166,10 @@ class NextPoints:
         if self._doubted and np.all(self._posterior.variance <= target):
             return self._looking(counts.batch, allowed), 0.0
         batch, worth = self._best(counts.way, allowed & ~self._chosen, target)
-        reasons = dict[int, str]()
-        apart = self._telling(allowed & ~self._chosen & ~batch, batch)
-        if apart is not None:
-            reasons[apart] = RIVALS
+        free, once = allowed & ~self._chosen & ~batch, np.ones(batch.size, dtype=np.int64)
+        seconds = self._costs.one_more_s(batch, once)
+        apart = telling_apart(self._rivals, self._chosen, free, seconds, self._apart)
+        reasons = dict.fromkeys(apart, RIVALS)
         self._spread(reasons, batch, counts.spread, allowed)
         known = self._posterior.copy()
         for point in reasons:  # they lower u as well
@@ -322,18 +319,6 @@ class NextPoints:
             so_far[point] = True
         return spent_s
 
-    def _telling(self, free: BoolArray, batch: BoolArray) -> int | None:
-        """Return the candidate that tells the closest rival best; None where all are told apart."""
-        if not free.any():
-            return None
-        seconds = self._costs.one_more_s(batch, np.ones(batch.size, dtype=np.int64))
-        for rival in self._rivals:
-            best = rival.best(self._chosen)
-            if best.chi2 < _TOLD:
-                worth = np.where(free, rival.differences(self._chosen, best) / seconds, -1.0)
-                return int(np.argmax(worth))
-        return None
-
 
 def _without_drift(information: Information) -> Information:
     """Return the information without the errors of the lamp's drift, which a forecast has too many.
@@ -377,23 +362,3 @@ def _worst(known: Knowledge) -> Geometry | None:
     views = (problem.geometry.theta_i_deg, problem.geometry.theta_r_deg, problem.geometry.dphi_deg)
     theta_i, theta_r, dphi = (np.ravel(view)[at : at + 1] for view in views)
     return Geometry.from_degrees(theta_i=theta_i, theta_r=theta_r, dphi=dphi)
-
-
-def _rivals(known: Knowledge, every: Forecast) -> Iterator[Rival]:
-    """Yield the other candidates that describe the readings best, those of other physics."""
-    if known.choice is None or known.leading is None or every.measurements.relative:
-        return  # relative values: the forecast's factor is not that of the rival's fit
-    own, seen = known.leading, {physics(known.leading.model)}
-    others = sorted((c for c in known.choice.candidates if c.converged), key=lambda c: c.bic)
-    for other in others:
-        if len(seen) > MOST_RIVALS:
-            return
-        if physics(other.model) not in seen and not _contains(other, own):
-            seen.add(physics(other.model))
-            problem = replace(every.problem, model=other.problem.model)
-            yield Rival(name=other.model, problem=problem, x=other.x, chi2=0.0)
-
-
-def _contains(other: FitResult, own: FitResult) -> bool:
-    """Return True for a sum with all terms of the leading model: it agrees wherever that does."""
-    return set(physics(own.model).split("+")) < set(physics(other.model).split("+"))

@@ -59,7 +59,7 @@ class PredictedReadings:
             "u_quantisation_dn": np.array([rounding_u_dn(own) for own in bright.tolist()]),
             "u_dark_dn": np.sqrt(self._squares * (dark + 1 / 12) / protocol.dark_frames),
             "u_placement_dn": signal_dn * self._u_placement,
-            "u_texture_dn": signal_dn * self._u_texture,
+            "u_texture_dn": np.abs(signal_dn) * self._u_texture,  # a model may be negative there
             "exposure_s": exposure_s,
             "peak_dn": camera.black_level_dn + signal_dn,
         }

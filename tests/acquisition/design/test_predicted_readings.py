@@ -72,3 +72,17 @@ def test_a_sample_without_light_is_flagged(small: Loaded) -> None:
     dark = changed(small, simulated_sample=sample.model_copy(update=black))
     for reading in _predicted(dark):
         assert reading.flags == ("" if reading.kind == "tile" else DARK)
+
+
+def test_where_a_model_is_negative_that_is_flagged(small: Loaded) -> None:
+    """The functional form of a rough dielectric is, at grazing views of a very rough one."""
+    rough = {"albedo": 0.17, "sigma_deg": 39.8, "n": 1.49}
+    sample = small.protocol.simulated_sample
+    assert sample is not None
+    rough_sample = sample.model_copy(update={"model": "wolff_oren_nayar", "parameters": rough})
+    sweep = {"theta_i_deg": [60.0], "dphi_deg": [0.0], "theta_r_deg": [-80.0, 0.0, 60.0]}
+    loaded = changed(small, simulated_sample=rough_sample, sweeps=[sweep])
+    found = {r.theta_r_deg: r for r in _predicted(loaded) if r.kind == "point"}
+    assert found[-80.0].signal_dn < 0 < found[0.0].signal_dn
+    assert [r.theta_r_deg for r in found.values() if r.flags == DARK] == [-80.0]
+    assert min(r.u_texture_dn for r in found.values()) >= 0
