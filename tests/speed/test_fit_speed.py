@@ -82,16 +82,16 @@ def test_the_ladder_and_an_exact_candidate_cost_a_few_lmfit_fits(scan: Measureme
 
     assert cpu_seconds(fit_exact, 2) < 100 * ruler
     assert exact[-1].converged
-    # About 6: 29 candidates, far from the data. 12 where searches crawl there.
+    # About 7.5: 29 candidates, far from the data. 12 where searches crawl there.
     wave = 1 + 0.05 * np.sin(np.radians(7 * scan.theta_r_deg) + scan.theta_i_deg)
     unexplained = replace(scan, brdf=scan.brdf * wave)
     ratio = cpu_ratio(
         lambda: choices.append(choose(unexplained, method="functional")),
         lambda: choose(scan, method="functional"),
-        2,
+        3,
     )
     assert choices[-1].verdict == "none adequate"
-    assert ratio < 9
+    assert ratio < 10
 
 
 NUMBER = itertools.count()
