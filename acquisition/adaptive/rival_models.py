@@ -43,10 +43,10 @@ def _contains(other: FitResult, own: FitResult) -> bool:
 def telling_apart(
     rivals: Sequence[Rival], design: BoolArray, free: BoolArray, seconds: FloatArray, most: int
 ) -> list[int]:
-    """Return up to `most` of the free candidates, masks (N,), that tell the closest rivals best.
+    """Return up to `most` of the free candidates, a mask (N,), that tell the closest rivals best.
 
-    By what they add to a rival's chi2 in each of the `seconds` (N,) that they take; none where the
-    design tells all rivals apart.
+    By what they add to a rival's chi2, in units of u^2, in each of the `seconds` (N,) that they
+    take; none where the design, a mask (N,), tells all rivals apart.
     """
     taken, found = design.copy(), list[int]()
     while len(found) < most and np.any(free & ~taken):

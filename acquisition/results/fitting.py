@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from acquisition.results.effects.turning import BLUR
 from acquisition.results.reduction import Reduced, require_usable, root_sum_square, shared_errors
 from analysis.choice.choice import Choice, choose
 from analysis.choice.fit_json import no_fit_json, to_json
@@ -65,11 +66,15 @@ class Fitted:
     def u_brdf(self, reduced: Reduced) -> FloatArray:
         """Standard uncertainty of every BRDF, (N,) in 1/sr.
 
-        That of fitted points includes the part from the angles, which needs a model.
+        That of fitted points includes the part from the angles, which needs a model. A model is
+        averaged over the turn of a moving axis, the value is not: its blur is part of its u.
         """
         u = np.abs(reduced.brdf) * root_sum_square(list(reduced.parts.values()))
         if self.chosen is not None and reduced.has_brdf:
             u[self.used] = self.chosen.u_total
+            if BLUR in reduced.components:
+                blurred = np.abs(reduced.brdf) * reduced.components[BLUR]
+                u[self.used] = np.hypot(u, blurred)[self.used]
         return u
 
 
@@ -104,7 +109,8 @@ def u_without(
     chosen, m = fitted.chosen, fitted.measurements
     if chosen is None or m is None:
         return {}
-    other = [u[fitted.used] for name, u in reduced.components.items() if name not in components]
+    left_out = {*components, BLUR}
+    other = [u[fitted.used] for name, u in reduced.components.items() if name not in left_out]
     fewer = replace(
         m,
         u_random=root_sum_square(other) * np.abs(m.brdf),
@@ -124,19 +130,20 @@ def measurements(reduced: Reduced, loaded: Loaded) -> Measurements:
     points = [p for p, kept in zip(reduced.points, keep, strict=True) if kept]
     theta_i_deg, axes = np.array([p.theta_i_deg for p in points]), loaded.rig.axes
     brdf = reduced.brdf if reduced.has_brdf else reduced.radiance
+    blur_deg = np.array([p.blur_deg for p in points])
     brdf = brdf[keep] if reduced.has_brdf else brdf[keep] / np.cos(np.radians(theta_i_deg))
-    u_relative = root_sum_square([u[keep] for u in reduced.components.values()])
     return Measurements(
         theta_i_deg=theta_i_deg,
         theta_r_deg=np.array([p.theta_r_deg for p in points]),
         dphi_deg=np.array([p.dphi_deg for p in points]),
         brdf=brdf,
-        u_random=u_relative * np.abs(brdf),
+        u_random=reduced.u_independent[keep] * np.abs(brdf),
         lamp_setting=np.array([p.lamp_setting for p in points], dtype=np.int64),
         shared=tuple(e.subset(keep) for e in shared_errors(reduced, loaded.rig)),
         u_theta_i_deg=axes.theta_i.u_deg,
         u_theta_r_deg=axes.theta_r.u_deg,
         u_dphi_deg=axes.dphi.u_deg,
+        blur_deg=blur_deg if np.any(blur_deg) else 0.0,
         relative=not reduced.has_brdf,
         free_levels=not reduced.has_brdf,
     )

@@ -14,7 +14,7 @@ from itertools import repeat
 
 import numpy as np
 
-from acquisition.results.reduction import Reduced, root_sum_square, shared_errors
+from acquisition.results.reduction import Reduced, shared_errors
 from analysis.data.acceptance import Acceptance
 from analysis.data.csv import columns
 from instrument.config.load import Loaded
@@ -68,8 +68,10 @@ def _columns_for_fits(reduced: Reduced, loaded: Loaded) -> Iterator[tuple[str, I
     """Name and cells of each column that a fit reads, beyond the angles and the BRDF."""
     settings = np.array([p.lamp_setting for p in reduced.points], dtype=np.int64)
     yield columns.LAMP_SETTING.name, _numbered(settings)
-    u_relative = root_sum_square(list(reduced.components.values()))
-    yield columns.U_INDEPENDENT.name, _cells(u_relative)
+    yield columns.U_INDEPENDENT.name, _cells(reduced.u_independent)
+    blur_deg = np.array([p.blur_deg for p in reduced.points])
+    if np.any(blur_deg):
+        yield columns.BLUR.name, _cells(blur_deg)
     errors = shared_errors(reduced, loaded.rig)
     for stem, error in zip(columns.stems(e.name for e in errors), errors, strict=True):
         yield columns.u_shared(stem).name, _cells(error.u_relative)

@@ -26,7 +26,7 @@ from acquisition.results.effects.flicker import with_flicker
 from acquisition.results.effects.lamp_level import drift_between, drift_noise, wander
 from acquisition.results.effects.lens import STRAY
 from acquisition.results.effects.rig_effects import has_effects, rig_effects
-from acquisition.results.effects.turning import turning_errors
+from acquisition.results.effects.turning import BLUR, turning_errors
 from analysis.data.measurements import SharedError
 from analysis.fit.certificate import CERTIFICATE
 from instrument.config.load import Loaded
@@ -82,6 +82,11 @@ class Reduced:
             so_far = found.get(error.name, np.zeros(len(self.points)))
             found[error.name] = np.hypot(so_far, error.u_relative)
         return found
+
+    @property
+    def u_independent(self) -> FloatArray:
+        """Relative u of each point, dimensionless (N,): what no other shares and no fit models."""
+        return root_sum_square([u for name, u in self.components.items() if name != BLUR])
 
     @property
     def u_radiance(self) -> FloatArray:

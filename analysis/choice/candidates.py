@@ -111,7 +111,7 @@ class Candidates:
         """First fits of the named models.
 
         ladder: rungs of all candidates, which are screened; empty: they are not. averaged: the
-        models will be averaged over the rig's acceptance. Raises `NotDetermined` where the points
+        models will be averaged as the rig does. Raises `NotDetermined` where the points
         are too few for all, `KeyError` for an unknown one.
         """
         fits = FirstFits(measurements)

@@ -23,6 +23,7 @@ from analysis.choice.runs_test import worst_stretches
 from analysis.choice.symmetry_test import Symmetry, symmetry
 from analysis.data.acceptance import Acceptance
 from analysis.data.measurements import Measurements
+from analysis.fit.acceptance_average import is_averaged
 from analysis.fit.certificate import led_by_certificate
 from analysis.fit.criteria import LEAST_NOISE
 from analysis.fit.first_fit import LEFT
@@ -90,7 +91,8 @@ def choose(
     every = models is not None
     if every or robust or measurements.free_levels:
         ladder = []
-    tried = Candidates.of(first, measurements, robust, every, ladder, acceptance is not None)
+    averaged = is_averaged(measurements, acceptance)
+    tried = Candidates.of(first, measurements, robust, every, ladder, averaged)
     fitted = _Fitted.of(tried.refined(acceptance), tried.measurements)
     for rung in others:
         explained = bool(fitted.within_u)

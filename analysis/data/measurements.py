@@ -64,12 +64,14 @@ class Measurements:
     shared: further shared errors, such as those of a white tile or of the dark frames.
     u_theta_i_deg, u_theta_r_deg, u_dphi_deg: of the angles, in degrees; points with the same
         theta_r share its error.
+    blur_deg: (N,) or 0, angle by which theta_r turned while a value was taken, which is the mean
+        over it; theta_r_deg is its middle.
     relative: `brdf` and `u_random` are radiance in a unit of its own, without a reference.
     free_levels: the lamp's brightness at each of its settings is unknown.
     geometry: (N,), that of the points; one object, so that models compute once what depends on it.
 
     Raises `ValueError` for shapes that differ, values that are not finite, angles outside their
-    domain, a `u_random` that is not positive, or a negative uncertainty of an angle.
+    domain, a `u_random` that is not positive, or a negative uncertainty of an angle or blur.
     """
 
     theta_i_deg: FloatArray
@@ -82,6 +84,7 @@ class Measurements:
     u_theta_i_deg: float = 0.0
     u_theta_r_deg: float = 0.0
     u_dphi_deg: float = 0.0
+    blur_deg: FloatArray | float = 0.0
     relative: bool = False
     free_levels: bool = False
     geometry: Geometry = field(init=False, repr=False, compare=False)
@@ -103,6 +106,8 @@ class Measurements:
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         for error in self.shared:
             arrays |= {error.name: error.u_relative, f"group of {error.name}": error.group}
+        if np.ndim(self.blur_deg):
+            arrays["blur_deg"] = self.blur_deg
         shape = (np.size(self.brdf),)
         for name, array in arrays.items():
             if array is None:
@@ -111,6 +116,11 @@ class Measurements:
                 raise ValueError(f"{name} has the shape {np.shape(array)}; allowed: {shape}")
             if not np.all(np.isfinite(array)):
                 raise ValueError(f"{name} holds a value that is not finite")
+        if not np.all(np.asarray(self.blur_deg) >= 0):
+            raise ValueError(f"blur_deg = {np.min(self.blur_deg):g} deg; allowed: 0 deg or more")
+        furthest_deg = np.max(np.abs(self.theta_r_deg) + np.asarray(self.blur_deg) / 2, initial=0.0)
+        if np.any(self.blur_deg) and furthest_deg > 90:
+            raise ValueError(f"theta_r turned to {furthest_deg:g} deg; allowed: up to 90 deg")
         if self.u_random is not None and np.any(self.u_random <= 0):
             raise ValueError(f"u_random = {self.u_random.min():g} 1/sr; allowed: more than 0 1/sr")
 
@@ -144,6 +154,7 @@ class Measurements:
         """The points marked True in `points` (N,), with their shared errors."""
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         chosen = {name: array[points] for name, array in arrays.items() if array is not None}
+        chosen["blur_deg"] = np.broadcast_to(self.blur_deg, points.shape)[points]
         return replace(self, **chosen, shared=tuple(error.subset(points) for error in self.shared))
 
     @property

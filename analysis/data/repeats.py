@@ -54,6 +54,7 @@ def mean_of_repeats(m: Measurements) -> tuple[Measurements, Repeats]:
         brdf=brdf,
         u_random=None if m.u_random is None else np.asarray(total**-0.5),
         lamp_setting=m.lamp_setting[first],
+        blur_deg=mean(m.blur_deg),
         shared=tuple(
             SharedError(e.name, mean(e.u_relative), e.group[first], *map(mean, e.angles_deg))
             for e in m.shared

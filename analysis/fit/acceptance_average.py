@@ -1,5 +1,6 @@
-"""Fit of a model averaged over the rig's acceptance, without averaging at every search step.
+"""Fit of a model averaged as the rig averages it, without averaging at every search step.
 
+Over the rig's acceptance, and over the angle by which theta_r turned while a value was taken.
 The averaged model is written as gain * model + offset, both computed at the parameters of the last
 round. The search runs with them fixed, then they are computed anew, until they no longer change.
 """
@@ -30,6 +31,10 @@ RELEVANT, CONVERGED, _QUADRATURE = 1 / 3, 0.05, 0.02
 # Outside these ratios a gain would magnify errors of a nearly vanishing model: then an offset.
 _MIN_GAIN, _MAX_GAIN = 0.1, 5.0
 
+# Gauss and Legendre's rule of three points for a mean over -1/2 to 1/2, exact up to the fifth power
+# (Abramowitz and Stegun 1964, table 25.4).
+_TURN = ((-math.sqrt(0.15), 5 / 18), (0.0, 8 / 18), (math.sqrt(0.15), 5 / 18))
+
 
 @dataclass(frozen=True, slots=True)
 class AveragedFit:
@@ -45,11 +50,11 @@ def fit_averaged(
     problem: Problem,
     solution: Minimum,
     measurements: Measurements,
-    acceptance: Acceptance,
+    acceptance: Acceptance | None,
     u: FloatArray,
     starts: Sequence[FloatArray] = (),
 ) -> AveragedFit:
-    """Refit with the model averaged over the acceptance, where that changes it by more than u/3.
+    """Refit with the model averaged as the rig does, where that changes it by more than u/3.
 
     `solution` is the fit without averaging, `u` (N,) the independent uncertainty in 1/sr; it counts
     as larger where the model does not explain the data. `starts`, (K,) each, are other minima of
@@ -87,8 +92,11 @@ def _corrected(problem: Problem, x: FloatArray, mean: FloatArray) -> Problem:
 
 
 def _rings(
-    problem: Problem, x: FloatArray, m: Measurements, acceptance: Acceptance, u: FloatArray
+    problem: Problem, x: FloatArray, m: Measurements, acceptance: Acceptance | None, u: FloatArray
 ) -> IntArray:
+    """Rings (N,) that the average over each point's acceptance needs."""
+    if acceptance is None:
+        return np.zeros(m.size, dtype=np.int64)
     size = np.maximum(np.abs(problem.model_brdf(x)), u)
     return required_rings(
         lambda geometry: problem.model_brdf(x, geometry),
@@ -101,17 +109,43 @@ def _rings(
 
 
 def _mean(
-    problem: Problem, x: FloatArray, m: Measurements, acceptance: Acceptance, rings: IntArray
+    problem: Problem, x: FloatArray, m: Measurements, acceptance: Acceptance | None, rings: IntArray
 ) -> FloatArray:
     """The averaged model (N,), each point with its own number of rings."""
+    if not np.any(m.blur_deg):
+        return _over_acceptance(problem, x, m, m.theta_r_deg, acceptance, rings)
+    views = ((m.theta_r_deg + part * m.blur_deg, weight) for part, weight in _TURN)
+    means = (
+        weight * _over_acceptance(problem, x, m, view, acceptance, rings) for view, weight in views
+    )
+    return np.asarray(sum(means))
+
+
+def _over_acceptance(
+    problem: Problem,
+    x: FloatArray,
+    m: Measurements,
+    theta_r_deg: FloatArray,
+    acceptance: Acceptance | None,
+    rings: IntArray,
+) -> FloatArray:
+    """The model (N,) averaged over the acceptance, if any, at views (N,) of their own."""
 
     def brdf(geometry: Geometry) -> FloatArray:
         return problem.model_brdf(x, geometry)
 
+    theta_i_deg, dphi_deg = m.theta_i_deg, m.dphi_deg
+    if acceptance is None:
+        return brdf(Geometry.from_degrees(theta_i=theta_i_deg, theta_r=theta_r_deg, dphi=dphi_deg))
     mean = np.empty(m.size)
     for n in np.unique(rings):
         k = rings == n
         mean[k] = averaged_brdf(
-            brdf, m.theta_i_deg[k], m.theta_r_deg[k], m.dphi_deg[k], acceptance, int(n)
+            brdf, theta_i_deg[k], theta_r_deg[k], dphi_deg[k], acceptance, int(n)
         )
     return mean
+
+
+def is_averaged(m: Measurements, acceptance: Acceptance | None) -> bool:
+    """True if the values are means, over the rig's acceptance or over a turn of theta_r."""
+    return acceptance is not None or bool(np.any(m.blur_deg))

@@ -17,7 +17,7 @@ import numpy as np
 from analysis.data.acceptance import Acceptance
 from analysis.data.covariance import Covariance, full_covariance, has_shared_errors
 from analysis.data.measurements import Measurements
-from analysis.fit.acceptance_average import AveragedFit, fit_averaged
+from analysis.fit.acceptance_average import AveragedFit, fit_averaged, is_averaged
 from analysis.fit.criteria import (
     OUTLIER_U,
     SIGNIFICANCE,
@@ -78,7 +78,8 @@ class FitResult:
     chi2, reduced_chi2: None where no u is stated; reduced_chi2 also without degrees of freedom.
     bic, aicc: -2 ln(likelihood) + K ln N, and + 2 K N / (N - K - 1): see `criteria.bic`.
     rms_relative: rms residual over mean BRDF; where no u is stated, less shared errors.
-    averaged: the model was averaged over the rig's acceptance, which is done where that matters.
+    averaged: the model was averaged over the rig's acceptance and the turn of an axis, which is
+        done where that matters.
     message: why the search ended.
     """
 
@@ -127,10 +128,10 @@ def fit(
     """Fit a model by generalised least squares; starting values are found automatically.
 
     A first fit with the independent uncertainties gives the curve around which the covariance of
-    all stated uncertainties is linearised (`covariance.full_covariance`). With an `acceptance` the
-    model is averaged over it where that changes it by more than a third of a point's independent
-    uncertainty. `robust`: large residuals count linearly (Huber 1964), and those beyond 4 u are
-    set aside and reported.
+    all stated uncertainties is linearised (`covariance.full_covariance`). With an `acceptance`, or
+    where theta_r turned, the model is averaged over it if that changes it by more than a third of a
+    point's independent uncertainty. `robust`: large residuals count linearly (Huber 1964), and
+    those beyond 4 u are set aside and reported.
 
     Where the model does not explain the data, its misfit counts as independent noise (Birge 1932);
     otherwise shared errors, such as that of the lamp's angle or of the tile, would have to absorb
@@ -247,7 +248,8 @@ def _widened(
 ) -> AveragedFit:
     """Refit with the misfit as independent noise: its variance grows until chi2 is as expected."""
     stated = linear.problem.covariance
-    if acceptance is None and linear.problem.huber is None and not stated.common.shape[1]:
+    averaged = is_averaged(m, acceptance)
+    if not averaged and linear.problem.huber is None and not stated.common.shape[1]:
         return _with_less_weight(linear)
     factor = 1.0
     for _ in range(_ROUNDS_OF_WIDENING):
@@ -300,7 +302,7 @@ def stated_u(result: FitResult, measurements: Measurements) -> dict[str, float]:
 
 def _averaged(linear: _Linearised, m: Measurements, acceptance: Acceptance | None) -> AveragedFit:
     problem, solution, others = linear
-    if acceptance is None:
+    if not is_averaged(m, acceptance):
         return AveragedFit(problem, solution, averaged=False, converged=True)
     u = problem.covariance.u_independent * math.sqrt(noise_variance(m, problem, solution))
     return fit_averaged(problem, solution, m, acceptance, u, others)

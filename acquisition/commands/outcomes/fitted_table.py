@@ -59,6 +59,8 @@ def _for_fits(m: Measurements) -> Iterator[tuple[str, FloatArray | IntArray]]:
         for column, angle in zip(columns.angles_by(stem), error.angles_deg, strict=True):
             if np.any(angle):
                 yield column.name, np.broadcast_to(np.asarray(angle), (m.size,))
+    if np.any(m.blur_deg):
+        yield columns.BLUR.name, np.broadcast_to(m.blur_deg, m.size)
     angles = (m.u_theta_i_deg, m.u_theta_r_deg, m.u_dphi_deg)
     for column, u in zip(columns.U_ANGLES, angles, strict=True):
         if u:

@@ -1,9 +1,10 @@
 """Uncertainty of frames that were exposed while theta_r turned: blur in angle, and the mean angle.
 
 Blur. A frame over the angle w shows the mean of the radiance f, which exceeds that at its middle by
-f'' w^2 / 24 (`acquisition.plan.flight`). f'' is taken from each reading and its two neighbours in
-the sweep; the term is not corrected but counts as a standard uncertainty. It has the sign of f''
-and is the same along a lobe, so the speed of a flight keeps it small.
+f'' w^2 / 24 (`acquisition.plan.flight`). A fit averages its model over w
+(`analysis.fit.acceptance_average`). The values themselves are not corrected: for those who read
+them, the term counts as a standard uncertainty, with f'' from each reading and its two neighbours
+in the sweep.
 
 Angle. The error of a time stamp differs from frame to frame. That of the latency is one for all
 frames of an exposure and changes its sign with the direction of the turn. What they do to the value

@@ -14,6 +14,7 @@ be left out: a run's measurements.csv has them all, a table of any origin may ha
     theta_i_by_NAME_deg, theta_r_by_NAME_deg, dphi_by_NAME_deg
                                 change of the angles by one u of that error
     u_theta_i_deg, u_theta_r_deg, u_dphi_deg       standard uncertainty of each angle's setting
+    blur_deg                    angle by which theta_r turned while the row's value was taken
     beam_length_mm, lamp_distance_mm               from the sample to the lens, and to the lamp
     source_solid_angle_sr, receiver_solid_angle_sr of lamp and lens, seen from the sample
     patch_width_mm, patch_height_mm                measured patch, the width along the camera's way
@@ -48,6 +49,7 @@ U_ANGLES = tuple(
     Column(name, "deg", "0 to 90 deg", 0.0, 90.0)
     for name in ("u_theta_i_deg", "u_theta_r_deg", "u_dphi_deg")
 )
+BLUR = Column("blur_deg", "deg", "0 to 90 deg", 0.0, 90.0)
 _DISTANCE = ("mm", "1e-3 to 1e6 mm", 1e-3, 1e6)
 _SOLID_ANGLE = ("sr", "0 to 1 sr", 0.0, 1.0)
 _SIDE = ("mm", "0 to 1e6 mm", 0.0, 1e6)
@@ -59,7 +61,7 @@ ACCEPTANCE = (
     Column("patch_width_mm", *_SIDE),
     Column("patch_height_mm", *_SIDE),
 )
-_OPTIONAL = (RADIANCE, LAMP_SETTING, U_INDEPENDENT, *U_ANGLES, *ACCEPTANCE)
+_OPTIONAL = (RADIANCE, LAMP_SETTING, U_INDEPENDENT, *U_ANGLES, BLUR, *ACCEPTANCE)
 _READ = {FLAGS, *(column.name for column in (*COLUMNS, *_OPTIONAL))}
 _SHARED = re.compile(r"u_shared_(.+)_relative|group_(.+)|(?:theta_[ir]|dphi)_by_(.+)_deg")
 

@@ -173,6 +173,7 @@ class _Table:
         setting = cells.whole_numbers(columns.LAMP_SETTING)
         shared, acceptance = cells.shared(), cells.acceptance()
         u_theta_i, u_theta_r, u_dphi = self._u_angles(cells, u_random)
+        blur_deg = self._blur_deg(cells, theta_r)
         if self.file.mistakes:
             raise input_error(self.file)
         found = Measurements(
@@ -186,6 +187,7 @@ class _Table:
             u_theta_i_deg=u_theta_i,
             u_theta_r_deg=u_theta_r,
             u_dphi_deg=u_dphi,
+            blur_deg=blur_deg,
             relative=relative,
             free_levels=relative,
         )
@@ -216,6 +218,17 @@ class _Table:
             what = f"of {values[n]:g} is {u[n]:g}; allowed: {U_BRDF.low:g} or more; state u_brdf"
             cells.note(int(n), column.name, what)
         return u
+
+    def _blur_deg(self, cells: Cells, theta_r_deg: FloatArray) -> FloatArray | float:
+        """Angle (N,) by which theta_r turned for each row, in degrees, 0 if not stated."""
+        column = columns.BLUR
+        blur_deg = cells.numbers(column)
+        if blur_deg is None:
+            return 0.0
+        for n in np.flatnonzero(np.abs(theta_r_deg) + blur_deg / 2 > 90):
+            allowed = f"{180 - 2 * abs(theta_r_deg[n]):g} deg or less about {theta_r_deg[n]:g} deg"
+            cells.note(int(n), column.name, f"{blur_deg[n]:g} deg; allowed: {allowed}")
+        return blur_deg
 
     def _u_angles(self, cells: Cells, u_random: FloatArray | None) -> list[float]:
         """Standard uncertainties of theta_i, theta_r and dphi in degrees, 0 if not stated."""

@@ -62,6 +62,23 @@ def test_independent_u_is_relative_and_goes_before_u_brdf() -> None:
     assert found.states_shared
 
 
+def test_the_turn_of_theta_r_during_each_row() -> None:
+    found = table(2, u_brdf=0.01, blur_deg=[0.5, 0.25]).measurements
+    assert np.array_equal(found.blur_deg, [0.5, 0.25])
+    assert np.array_equal(found.subset(np.array([False, True])).blur_deg, [0.25])
+    assert not np.any(table(2, u_brdf=0.01).measurements.blur_deg)
+
+
+def test_a_turn_beyond_the_horizon_is_a_mistake_of_its_row() -> None:
+    Path("data.csv").write_text(
+        "theta_i_deg,theta_r_deg,dphi_deg,brdf,blur_deg\n30,0,0,0.2,5\n30,-89,0,0.2,2.5\n"
+    )
+    with pytest.raises(InputError) as caught:
+        read_table(Path("data.csv"))
+    allowed = "allowed: 2 deg or less about -89 deg"
+    assert f"data.csv:3:14: blur_deg: 2.5 deg; {allowed}" in str(caught.value)
+
+
 def test_lamp_settings_acceptance_and_u_of_angles() -> None:
     u_deg = {"u_theta_i_deg": 0.1, "u_theta_r_deg": 0.02, "u_dphi_deg": 0.3}
     found = table(2, u_brdf=0.01, lamp_setting=[4, 2], **ACCEPTANCE, **u_deg)

@@ -16,8 +16,11 @@ from acquisition.engine.pause import PauseSwitch
 from acquisition.engine.resume import Progress
 from acquisition.plan.plan import Step, make_plan
 from acquisition.results.effects.turning import smear, turning_note
+from acquisition.results.fitting import fit_run
+from acquisition.results.measurements_csv import measurements_csv
 from acquisition.results.reduction import reduced_run
 from acquisition.rig import open_devices
+from analysis.data.csv.table import read_table
 from instrument.config.load import Loaded
 from instrument.config.protocol import References, Steps
 from instrument.errors import ComputerPaused, DeviceError
@@ -231,3 +234,24 @@ def test_values_carry_the_blur_and_the_errors_of_the_angles(flown: Loaded, recor
     assert np.unique(shared["angle of a moving frame"].group).size == len(reduced.points)
     assert re.search(r"by up to 0\.\d+ deg in one exposure", turning_note(reduced.points))
     assert Progress.of(record).missing(make_plan(flown)) == ()
+
+
+def test_a_fit_knows_the_turn_of_each_frame_from_the_run_and_from_its_table(
+    flown: Loaded, record: Record, tmp_path: Path
+) -> None:
+    """The blur is part of the u of a value, which is a mean, but not of what the fit takes."""
+    scan(flown, record)
+    reduced = reduced_run(record, flown)
+    fitted = fit_run(reduced, flown)
+    m, u_brdf = fitted.measurements, fitted.u_brdf(reduced)
+    assert m is not None
+    assert fitted.chosen is not None
+    assert np.array_equal(m.blur_deg, [p.blur_deg for p in reduced.points])
+    assert np.all(m.blur_deg > 0)
+    blurred = reduced.parts["blur in angle"] * np.abs(m.brdf)
+    assert u_brdf == pytest.approx(np.hypot(fitted.chosen.u_total, blurred))
+    path = tmp_path / "measurements.csv"
+    path.write_text(measurements_csv(reduced, u_brdf, fitted.parts(reduced), flown))
+    again = read_table(path).measurements
+    assert np.array_equal(again.blur_deg, m.blur_deg)
+    assert again.u_random == pytest.approx(m.u_random)
