@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import re
 import signal
+from itertools import count
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from acquisition.terminal import stop_signals
-from instrument.record.reading import Reading, batches_of
+from acquisition.plan.plan import Step
+from acquisition.plan.step_count import StepCount
+from instrument.record.reading import batches_of
 from instrument.record.record import Record
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import small_demo
-from tests.support.timing.deadline import wait_for
+from tests.support.timing.deadline import send_and_await
 
 
 @pytest.fixture(scope="module")
@@ -33,16 +33,15 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def run(small: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A run that was stopped with Ctrl-C and resumed, and what was printed."""
-    folder, add_reading = tmp_path_factory.mktemp("runs") / "run", Record.add_reading
+    folder, add, numbers = tmp_path_factory.mktemp("runs") / "run", StepCount.add, count(1)
 
-    def stop_after_some(record: Record, reading: Reading, *more: Any, **named: Any) -> None:
-        add_reading(record, reading, *more, **named)
-        if len(record.readings()) == 9:
-            os.kill(os.getpid(), signal.SIGINT)
-            wait_for(lambda: stop_signals.reason() != "", "the signal")
+    def stop_after_some(counted: StepCount, step: Step) -> None:
+        add(counted, step)
+        if next(numbers) == 9:
+            send_and_await(signal.SIGINT)
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Record, "add_reading", stop_after_some)
+        patched.setattr(StepCount, "add", stop_after_some)
         done = gonio("run", small, "--until", "albedo=0.02", "--budget-min", 30, "--out", folder)
     assert done.returncode == 4, done.stderr
     assert "until u(albedo) 0.02, at most 30 min, of 30 geometries" in done.stderr

@@ -10,17 +10,16 @@ import shutil
 import signal
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from acquisition.commands import scan
-from acquisition.terminal import stop_signals
-from instrument.record.reading import Reading
+from acquisition.plan.plan import Step
+from acquisition.plan.step_count import StepCount
 from instrument.record.record import Record
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import TWO_MODELS, small_demo
-from tests.support.timing.deadline import wait_for
+from tests.support.timing.deadline import send_and_await
 
 METADATA = "{sample_id: F-17, operator: Jürgen, wavelength_nm: 550, notes: 'two, \"three\"'}"
 
@@ -53,16 +52,15 @@ def finished(run: tuple[Path, subprocess.CompletedProcess[str]]) -> Path:
 def stopped(small: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run stopped with Ctrl-C after some readings: copy it before changing it."""
     folder = tmp_path_factory.mktemp("stopped") / "run"
-    add_reading = Record.add_reading
+    add = StepCount.add
 
-    def stop_after_some(record: Record, reading: Reading, *more: Any, **named: Any) -> None:
-        add_reading(record, reading, *more, **named)
-        if reading.step == 5:
-            os.kill(os.getpid(), signal.SIGINT)
-            wait_for(lambda: stop_signals.reason() != "", "the signal")
+    def stop_after_some(count: StepCount, step: Step) -> None:
+        add(count, step)
+        if step.index == 5:
+            send_and_await(signal.SIGINT)
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Record, "add_reading", stop_after_some)
+        patched.setattr(StepCount, "add", stop_after_some)
         done = gonio("run", small, "--out", folder)
     assert done.returncode == 4, done.stderr
     assert f"gonio resume {folder}" in done.stderr
