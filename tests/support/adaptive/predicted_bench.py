@@ -17,6 +17,7 @@ from acquisition.adaptive.candidate_list import candidate_list, with_goal
 from acquisition.adaptive.chooser import Chooser
 from acquisition.adaptive.course import chooser_of, chosen_while_measured
 from acquisition.design.predicted_readings import PredictedReadings
+from acquisition.measure.placement import tilt_deg
 from acquisition.plan.plan import Plan, Step, make_plan
 from acquisition.results.run_folder import run_meta
 from analysis.models import MODELS
@@ -120,32 +121,45 @@ class PredictedBench:
     def _drawn(self, r: Reading, frames: int) -> Reading:
         u_noise_dn = r.u_noise_dn * np.sqrt(r.frames / frames)
         r = replace(r, frames=frames, u_noise_dn=float(u_noise_dn))
-        signal = r.signal_dn * self._by_angles(r) * self._by_tile(r)
-        signal += r.u_noise_dn * self._random("noise", r.step)
         # Rounding and texture are the same each time at one geometry: at checks of the drift, too.
         at = (r.surface, r.theta_i_deg, r.theta_r_deg, r.dphi_deg)
+        placed = r.u_placement_dn * self._random("placement", r.surface)
+        factor = 1 + (placed + r.u_texture_dn * self._random("texture", *at)) / r.signal_dn
+        factor *= self._by_angles(r) * self._by_tile(r)
+        signal = r.signal_dn * factor + r.u_noise_dn * self._random("noise", r.step)
         signal += r.u_quantisation_dn * self._random("rounding", *at)
-        signal += r.u_texture_dn * self._random("texture", *at)
         signal += r.u_dark_dn * self._random("dark", r.exposure_s)
-        signal += r.u_placement_dn * self._random("placement", r.surface)
-        return replace(r, signal_dn=float(signal))
+        return replace(  # the errors of place are relative ones, as those found in a picture
+            r,
+            signal_dn=float(signal),
+            u_placement_dn=float(r.u_placement_dn * factor),
+            u_texture_dn=float(r.u_texture_dn * abs(factor)),
+        )
 
     def _by_angles(self, r: Reading) -> float:
-        """Factor on a reading by the errors of the axes, which depend on the angle alone."""
+        """Factor on a reading by the errors of its angles."""
         axes = self.loaded.rig.axes
         off_i = axes.theta_i.u_deg * self._random("theta_i", r.theta_i_deg)
         off_r = axes.theta_r.u_deg * self._random("theta_r", r.theta_r_deg)
         lit = np.cos(np.radians(r.theta_i_deg + off_i)) / np.cos(np.radians(r.theta_i_deg))
         if r.surface != "sample":
             return float(lit)
+        by_i, by_r = self._tilts_deg(r)
         there, here = (
             self._brdf(Geometry.from_degrees(theta_i=i, theta_r=t, dphi=r.dphi_deg))
             for i, t in (
-                (r.theta_i_deg + off_i, r.theta_r_deg + off_r),
+                (r.theta_i_deg + off_i + by_i, r.theta_r_deg + off_r + by_r),
                 (r.theta_i_deg, r.theta_r_deg),
             )
         )
         return float(lit * there / here)
+
+    def _tilts_deg(self, r: Reading) -> FloatArray:
+        """Changes (2,) of theta_i and theta_r, in degrees, by a sample that is off the axes."""
+        rig, placed = self.loaded.rig, self._random("placement", r.surface)
+        angles = np.array([r.theta_i_deg, r.theta_r_deg])
+        distances = np.array([rig.lamp_distance_mm, rig.beam_length_mm])
+        return placed * tilt_deg(angles, rig.u_placement_mm, 1.0) / distances
 
     def _by_tile(self, r: Reading) -> float:
         tile = self.loaded.protocol.references.white_tile
