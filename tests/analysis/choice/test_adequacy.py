@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.choice.adequacy import agreement, rms_judged, wide_range
+from analysis.choice.adequacy import MOST_U_SCALE, agreement, rms_judged, wide_range
 from analysis.choice.choice import choose
 from analysis.choice.fit_json import to_json
 from analysis.choice.notes import NoteCode
@@ -44,6 +44,11 @@ def test_u_is_not_blamed_for_a_misfit() -> None:
     assert untested.verdict == "none adequate"
     wild = replace(m, brdf=m.brdf * (1 + 0.3 * np.random.default_rng(0).normal(size=m.size)))
     assert choose(wild, models=["oren_nayar"]).verdict == "none adequate"  # random, but 30 %
+    noisy = scan("oren_nayar", 3, u_relative=5e-3, u_deg=0.0, albedo=0.8, sigma_deg=30)
+    assert noisy.u_random is not None
+    for factor in (MOST_U_SCALE / 2, 2 * MOST_U_SCALE):  # random, and 0.5 %
+        found = choose(replace(noisy, u_random=noisy.u_random / factor), models=["oren_nayar"])
+        assert (found.verdict == "adequate") == (factor < MOST_U_SCALE)
 
 
 def peak(decades: float) -> tuple[Measurements, np.ndarray]:
