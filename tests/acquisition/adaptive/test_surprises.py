@@ -1,9 +1,9 @@
 """Samples that no candidate model describes: an adaptive scan finds so, or the difference is told.
 
 Measured for a u of sigma that a dozen points give. The sweep of 5 degrees finds all; the adaptive
-scan 5 of 6 retro peaks, 6 of 6 of another family, 4 of 6 narrow lobes: it misses one where it ends
-after a dozen points, none of which met it. In the time of a sweep of 10 degrees it finds 2 of 4
-retro peaks: the fit to so few points takes the others for scatter.
+scan all retro peaks and those of another family, 6 of 6 each, and 4 of 6 narrow lobes: it misses
+one where it ends after a dozen points, none of which met it. In the time of a sweep of 10 degrees
+it finds 5 of 6 retro peaks.
 """
 
 from __future__ import annotations
@@ -33,4 +33,4 @@ def test_what_no_model_has_is_found(
     text = f"{adaptive} of {len(outcomes)}, by the sweep {by_sweep}; points {parts} of the sweep's"
     record_testsuite_property(f"found: {kind}", text)
     assert by_sweep == len(outcomes)
-    assert adaptive >= (len(outcomes) / 3 if kind == "narrow lobe" else by_sweep - slow)
+    assert adaptive >= (len(outcomes) / 3 if kind == "narrow lobe" else by_sweep)

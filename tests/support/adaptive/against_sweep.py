@@ -52,6 +52,10 @@ def random_sample(seed: int) -> Sample:
     return name, {**own, **more}
 
 
+class NoSweepU(ValueError):
+    """The sweep's fit states no u that an adaptive scan could be asked for."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scanned:
     """Result of a scan: time of its points in s, u of sigma and deviation in units of it."""
@@ -139,7 +143,7 @@ def compared(
 
     The goal is so many `times` the u of sigma that the sweep's fit states; without one, of the
     albedo. plain: the sweep's protocol and rig, those of the demonstration if not given. extra:
-    what the sample's BRDF has beyond its model, in 1/sr.
+    what the sample's BRDF has beyond its model, in 1/sr. Raises `NoSweepU`.
     """
     plain = five_degrees() if plain is None else plain
     sweep, name, wanted = _swept(plain, sample, seed, extra)
@@ -162,11 +166,11 @@ def _swept(
     choice = quick_fit(Rows(bench.all_readings(), (), ()), plain)
     best = choice.best
     if best is None:
-        raise ValueError("the sweep has no fit")
+        raise NoSweepU("the sweep has no fit")
     name = "sigma_deg" if best.u.get("sigma_deg") is not None else "albedo"
     u = best.u.get(name)
     if u is None:
-        raise ValueError(f"the sweep states no u of {name}")
+        raise NoSweepU(f"the sweep states no u of {name}")
     return _scanned(choice, plan.steps, chooser.layout, sample, name), name, u
 
 
