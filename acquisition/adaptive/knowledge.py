@@ -26,10 +26,12 @@ class Knowledge:
 
     leading: the candidate that the next points are for, of those with the parameters asked for: the
     chosen one, or the one that was chosen most often before, while the data hardly contradict it.
+    contested: another model than that one is chosen now.
     """
 
     choice: Choice | None = None
     leading: FitResult | None = None
+    contested: bool = False
 
     @classmethod
     def of(
@@ -50,18 +52,16 @@ class Knowledge:
         except (GonioError, ValueError):
             return cls()  # too few, or all flagged: there is nothing to go by yet
         able = [c for c in choice.candidates if set(aims.u) <= set(c.u) and c.converged]
-        return cls(choice, _leading(able, choice.chosen or "", former))
+        chosen = [c for c in able if c.model == choice.chosen]
+        usual = _still_possible(able, former)
+        best = min(usual or chosen or able, key=lambda c: c.bic, default=None)
+        contested = bool(usual and chosen) and physics(chosen[0].model) != physics(former)
+        return cls(choice, best, contested)
 
     @property
     def model(self) -> str:
         """Name of the chosen model, empty without one."""
         return "" if self.choice is None else self.choice.chosen or ""
-
-    @property
-    def contested(self) -> bool:
-        """True if another model than the leading one is chosen."""
-        leads = self.leading is not None and physics(self.leading.model)
-        return bool(self.model and leads and leads != physics(self.model))
 
     @property
     def verdict(self) -> str:
@@ -74,15 +74,14 @@ class Knowledge:
         return {name: None if best is None else best.u.get(name) for name in aims.u}
 
 
-def _leading(able: Sequence[FitResult], chosen: str, former: str) -> FitResult | None:
-    """Return the former leader, if no very strong evidence is against it, else the chosen one.
+def _still_possible(able: Sequence[FitResult], former: str) -> list[FitResult]:
+    """Return the fits of the former leader that no very strong evidence is against.
 
     By chance another model is chosen for a batch or two; points for that one would be wasted.
     """
     least = min((c.bic for c in able), default=0.0)
-    kept = [c for c in able if physics(c.model) == physics(former) and c.bic < least + _VERY_STRONG]
-    best = kept or [c for c in able if c.model == chosen] or able
-    return min(best, key=lambda c: c.bic, default=None)
+    own = [c for c in able if physics(c.model) == physics(former)]
+    return [c for c in own if c.bic < least + _VERY_STRONG]
 
 
 def usual_model(batches: Sequence[Batch]) -> str:

@@ -154,7 +154,8 @@ class Measurements:
         """The points marked True in `points` (N,), with their shared errors."""
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         chosen = {name: array[points] for name, array in arrays.items() if array is not None}
-        chosen["blur_deg"] = np.broadcast_to(self.blur_deg, points.shape)[points]
+        if isinstance(self.blur_deg, np.ndarray):
+            chosen["blur_deg"] = self.blur_deg[points]
         return replace(self, **chosen, shared=tuple(error.subset(points) for error in self.shared))
 
     @property

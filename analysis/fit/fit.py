@@ -56,7 +56,7 @@ _LARGE_SHARED = 0.01
 OfParameters = Literal["profiled", "none"]
 """Uncertainty of a fit's parameters: with the intervals of those that have no u, or none yet."""
 
-NOT_CONVERGED = "the averaging over lamp and lens did not converge"
+NOT_CONVERGED = "the averaging over lamp, lens and a turning axis did not converge"
 
 
 @dataclass(frozen=True, slots=True)
