@@ -109,11 +109,9 @@ def u_without(
     chosen, m = fitted.chosen, fitted.measurements
     if chosen is None or m is None:
         return {}
-    left_out = {*components, BLUR}
-    other = [u[fitted.used] for name, u in reduced.components.items() if name not in left_out]
     fewer = replace(
         m,
-        u_random=root_sum_square(other) * np.abs(m.brdf),
+        u_random=reduced.u_independent(components)[fitted.used] * np.abs(m.brdf),
         shared=tuple(error for error in m.shared if error.name not in components),
     )
     stated, without = stated_u(chosen, m), stated_u(chosen, fewer)
@@ -137,7 +135,7 @@ def measurements(reduced: Reduced, loaded: Loaded) -> Measurements:
         theta_r_deg=np.array([p.theta_r_deg for p in points]),
         dphi_deg=np.array([p.dphi_deg for p in points]),
         brdf=brdf,
-        u_random=reduced.u_independent[keep] * np.abs(brdf),
+        u_random=reduced.u_independent()[keep] * np.abs(brdf),
         lamp_setting=np.array([p.lamp_setting for p in points], dtype=np.int64),
         shared=tuple(e.subset(keep) for e in shared_errors(reduced, loaded.rig)),
         u_theta_i_deg=axes.theta_i.u_deg,

@@ -68,7 +68,7 @@ def _columns_for_fits(reduced: Reduced, loaded: Loaded) -> Iterator[tuple[str, I
     """Name and cells of each column that a fit reads, beyond the angles and the BRDF."""
     settings = np.array([p.lamp_setting for p in reduced.points], dtype=np.int64)
     yield columns.LAMP_SETTING.name, _numbered(settings)
-    yield columns.U_INDEPENDENT.name, _cells(reduced.u_independent)
+    yield columns.U_INDEPENDENT.name, _cells(reduced.u_independent())
     blur_deg = np.array([p.blur_deg for p in reduced.points])
     if np.any(blur_deg):
         yield columns.BLUR.name, _cells(blur_deg)

@@ -9,7 +9,7 @@ memory.
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -83,10 +83,13 @@ class Reduced:
             found[error.name] = np.hypot(so_far, error.u_relative)
         return found
 
-    @property
-    def u_independent(self) -> FloatArray:
-        """Relative u of each point, dimensionless (N,): what no other shares and no fit models."""
-        return root_sum_square([u for name, u in self.components.items() if name != BLUR])
+    def u_independent(self, without: Iterable[str] = ()) -> FloatArray:
+        """Relative u of each point, dimensionless (N,): what no other shares and no fit models.
+
+        `without`: further components that are left out.
+        """
+        left_out = {BLUR, *without}
+        return root_sum_square([u for name, u in self.components.items() if name not in left_out])
 
     @property
     def u_radiance(self) -> FloatArray:

@@ -111,8 +111,8 @@ class Candidates:
         """First fits of the named models.
 
         ladder: rungs of all candidates, which are screened; empty: they are not. averaged: the
-        models will be averaged as the rig does. Raises `NotDetermined` where the points
-        are too few for all, `KeyError` for an unknown one.
+        models will be averaged as the rig does. Raises `NotDetermined` where the points are too few
+        for all, `KeyError` for an unknown one.
         """
         fits = FirstFits(measurements)
         screen = None

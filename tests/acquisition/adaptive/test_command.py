@@ -5,19 +5,15 @@ from __future__ import annotations
 import csv
 import json
 import re
-import signal
-from itertools import count
 from pathlib import Path
 
 import pytest
 
-from acquisition.plan.plan import Step
-from acquisition.plan.step_count import StepCount
 from instrument.record.reading import batches_of
 from instrument.record.record import Record
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import small_demo
-from tests.support.timing.deadline import send_and_await
+from tests.support.terminal.ctrl_c import ctrl_c_after
 
 
 @pytest.fixture(scope="module")
@@ -33,15 +29,8 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def run(small: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A run that was stopped with Ctrl-C and resumed, and what was printed."""
-    folder, add, numbers = tmp_path_factory.mktemp("runs") / "run", StepCount.add, count(1)
-
-    def stop_after_some(counted: StepCount, step: Step) -> None:
-        add(counted, step)
-        if next(numbers) == 9:
-            send_and_await(signal.SIGINT)
-
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(StepCount, "add", stop_after_some)
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    with ctrl_c_after(9):
         done = gonio("run", small, "--until", "albedo=0.02", "--budget-min", 30, "--out", folder)
     assert done.returncode == 4, done.stderr
     assert "until u(albedo) 0.02, at most 30 min, of 30 geometries" in done.stderr

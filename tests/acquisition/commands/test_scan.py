@@ -7,19 +7,16 @@ import json
 import os
 import re
 import shutil
-import signal
 import subprocess
 from pathlib import Path
 
 import pytest
 
 from acquisition.commands import scan
-from acquisition.plan.plan import Step
-from acquisition.plan.step_count import StepCount
 from instrument.record.record import Record
 from tests.support.command import gonio_here as gonio
 from tests.support.scans import TWO_MODELS, small_demo
-from tests.support.timing.deadline import send_and_await
+from tests.support.terminal.ctrl_c import ctrl_c_after
 
 METADATA = "{sample_id: F-17, operator: Jürgen, wavelength_nm: 550, notes: 'two, \"three\"'}"
 
@@ -52,15 +49,7 @@ def finished(run: tuple[Path, subprocess.CompletedProcess[str]]) -> Path:
 def stopped(small: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run stopped with Ctrl-C after some readings: copy it before changing it."""
     folder = tmp_path_factory.mktemp("stopped") / "run"
-    add = StepCount.add
-
-    def stop_after_some(count: StepCount, step: Step) -> None:
-        add(count, step)
-        if step.index == 5:
-            send_and_await(signal.SIGINT)
-
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(StepCount, "add", stop_after_some)
+    with ctrl_c_after(6):
         done = gonio("run", small, "--out", folder)
     assert done.returncode == 4, done.stderr
     assert f"gonio resume {folder}" in done.stderr

@@ -28,15 +28,20 @@ def test_averaging_is_applied_only_where_it_matters() -> None:
     assert not fit(MODELS["lambert"], scan("lambert", 4, acceptance=RIG, albedo=0.8), RIG).averaged
 
 
+def glossy(random: np.random.Generator, low: float, high: float) -> dict[str, float]:
+    """Parameters of lambert+ggx, alpha between these."""
+    return {
+        "albedo": random.uniform(0.2, 0.7),
+        "f0": random.uniform(0.03, 0.06),
+        "alpha": random.uniform(low, high),
+    }
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_averaging_is_so_exact_that_it_shifts_no_parameter_by_a_part_of_its_u(seed: int) -> None:
     """Values without an error, whose u is that of a good scan."""
     random = np.random.default_rng(seed)
-    truth = {
-        "albedo": random.uniform(0.2, 0.7),
-        "f0": random.uniform(0.03, 0.06),
-        "alpha": random.uniform(0.25, 0.45),
-    }
+    truth = glossy(random, 0.25, 0.45)
     model, views = MODELS["lambert+ggx"], np.arange(-80.0, 81.0, 12.0)
     lamps = np.repeat(random.uniform(10.0, 65.0, 2), views.size)
     angles = (lamps, np.tile(views, 2), np.zeros(lamps.size))
@@ -53,11 +58,7 @@ def test_a_turn_during_the_exposure_shifts_no_parameter_by_a_part_of_its_u(
 ) -> None:
     """Lobes of some 10 degrees, each frame over up to half of that; its mean is a sum of many."""
     random = np.random.default_rng([seed, 7])
-    truth = {
-        "albedo": random.uniform(0.2, 0.7),
-        "f0": random.uniform(0.03, 0.06),
-        "alpha": random.uniform(0.1, 0.2),
-    }
+    truth = glossy(random, 0.1, 0.2)
     model, views = MODELS["lambert+ggx"], np.arange(-75.0, 76.0, 2.5)
     lamps = np.repeat(random.uniform(20.0, 60.0, 2), views.size)
     theta_r, blur_deg = np.tile(views, 2), random.uniform(2.0, 5.0, lamps.size)

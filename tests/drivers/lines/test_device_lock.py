@@ -25,7 +25,8 @@ from drivers.lines.serial_line import Line, PortClosed, PortGone
 from instrument.clock import SystemClock
 from sim.emulated.wire import PtyWire
 from tests.support.paths import ROOT
-from tests.support.stages.waiting import wait_until
+from tests.support.timing.deadline import wait_for
+from tests.support.usb.left_behind import open_descriptors
 
 HOLD = """
 import sys
@@ -116,16 +117,11 @@ def test_a_closed_port_is_free_though_a_thread_still_waits_for_its_bytes(
     line = opened(port)
     with pytest.raises(OSError, match="exclusively lock"):
         serial.Serial(port, exclusive=True)
-    copies = [os.dup(descriptor) for descriptor in descriptors_of(port)]
+    copies = [os.dup(int(number)) for number, target in open_descriptors() if target == port]
     line.close()
     opened(port).close()
     for copy in copies:
         os.close(copy)
-
-
-def descriptors_of(path: str) -> list[int]:
-    links = [link for link in Path("/proc/self/fd").iterdir() if link.is_symlink()]
-    return [int(link.name) for link in links if str(link.readlink()) == path]
 
 
 def test_a_line_that_is_closed_while_it_is_opened_anew_keeps_no_port(
@@ -140,7 +136,7 @@ def test_a_line_that_is_closed_while_it_is_opened_anew_keeps_no_port(
 
     def open_and_close(*args: Any, **options: Any) -> serial.Serial:
         closing.start()
-        wait_until(lambda: "closed by this program" in error_of_writing(line))
+        wait_for(lambda: "closed by this program" in error_of_writing(line), "the closing")
         return open_port(*args, **options)
 
     monkeypatch.setattr(serial, "serial_for_url", open_and_close)

@@ -14,7 +14,8 @@ def _threads() -> set[str]:
     return {f"{t.name} {t.ident}" for t in threading.enumerate()}
 
 
-def _descriptors() -> set[tuple[str, str]]:
+def open_descriptors() -> set[tuple[str, str]]:
+    """Return the number and the target of each descriptor that this process has open."""
     found = set[tuple[str, str]]()
     for link in list(Path("/proc/self/fd").iterdir()):
         with suppress(FileNotFoundError):  # that of the list itself
@@ -28,7 +29,7 @@ def nothing_left_behind() -> Iterator[None]:
 
     Those of before may go meanwhile: a closed emulated port keeps its number for a few seconds.
     """
-    threads, descriptors = _threads(), _descriptors()
+    threads, descriptors = _threads(), open_descriptors()
     yield
     wait_for(lambda: _threads() <= threads, "end of all threads")
-    assert _descriptors() <= descriptors
+    assert open_descriptors() <= descriptors
