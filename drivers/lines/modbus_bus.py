@@ -98,8 +98,7 @@ class ModbusBus(Closeable):
 
         A numbered name may belong to another device by then: it is opened again for a stop only.
         """
-        if self._closed:
-            raise PortClosed(f"{who}: {self.port}: it was closed by this program")
+        self._require_open(who)
         if self._gone and not (self._follows_device or at_any_path):
             raise self._port_gone(who, self._gone)
         try:
@@ -110,6 +109,13 @@ class ModbusBus(Closeable):
                 raise self._port_gone(who, str(error)) from error
             look = _CHECK_GATEWAY if self._tcp else _CHECK_PORT
             raise PortGone(f"{who}: cannot open {self.port}: {error}: {look}") from error
+        if self._closed:  # by another thread, while it was being opened
+            self._close_client()
+        self._require_open(who)
+
+    def _require_open(self, who: str) -> None:
+        if self._closed:
+            raise PortClosed(f"{who}: {self.port}: it was closed by this program")
 
     def release_foreign(self) -> None:
         """Close a port that was opened again for a stop, and may belong to another device."""

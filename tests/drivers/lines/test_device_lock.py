@@ -20,6 +20,7 @@ import serial
 from drivers.factory import Lines
 from drivers.lines import device_lock
 from drivers.lines.device_lock import DeviceInUse, DeviceLock
+from drivers.lines.modbus_bus import ModbusBus
 from drivers.lines.modbus_client import BusSettings, SerialClient, client_for
 from drivers.lines.serial_line import Line, PortClosed, PortGone
 from instrument.clock import SystemClock
@@ -143,6 +144,27 @@ def test_a_line_that_is_closed_while_it_is_opened_anew_keeps_no_port(
     with contextlib.suppress(PortClosed):  # unless the stop was sent before
         line.write_at_once(b"1ST")
     closing.join(timeout=5.0)
+    serial.Serial(port, exclusive=True).close()
+
+
+def test_a_bus_that_is_closed_while_it_is_opened_anew_keeps_no_port(
+    port: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus = ModbusBus("theta_r", BusSettings(port, parity="N"), SystemClock())
+    open_port = serial.serial_for_url
+    with monkeypatch.context() as patched:
+        patched.setattr(serial.Serial, "fileno", Mock(side_effect=OSError("unplugged")))
+        with pytest.raises(PortGone, match="unplugged"):
+            bus.exchange("theta_r", lambda client: client.listen(0.0))
+
+    def open_and_close(*args: Any, **options: Any) -> serial.Serial:
+        opened = open_port(*args, **options)
+        bus.close()
+        return opened
+
+    monkeypatch.setattr(serial, "serial_for_url", open_and_close)
+    with pytest.raises(PortClosed):
+        bus.open("theta_r", at_any_path=True)
     serial.Serial(port, exclusive=True).close()
 
 
