@@ -98,8 +98,12 @@ def worst_stretches(m: Measurements, residuals: FloatArray, most: int = 3) -> li
     swept = sweeps(m)
     inside = np.concatenate([s.points for s in swept]) if swept else np.zeros(0, dtype=np.int64)
     outside = np.setdiff1d(np.arange(m.size), inside)
-    single = [Sweep(float(m.theta_i_deg[k]), float(plane[k]), np.array([k])) for k in outside]
-    parts = [(s, part) for s in (*swept, *single) for part in _one_sided(s.points, residuals)]
+    single = [
+        Sweep(float(m.theta_i_deg[k]), float(plane[k]), np.array([k]))
+        for k in outside[residuals[outside] != 0]
+    ]
+    parts = [(s, part) for s in swept for part in _one_sided(s.points, residuals)]
+    parts += [(s, s.points) for s in single]
     weights = _weights(residuals, [part for _, part in parts])
     worst = [parts[n] for n in np.argsort(-weights, kind="stable")[:most]]
     found = [_stretch(sweep, points, m, views, residuals) for sweep, points in worst]
