@@ -11,7 +11,7 @@ from analysis.data.sweeps import plane_and_view
 from instrument.geometry import BoolArray, FloatArray
 
 # Share of the points that may be peaks; a peak is above the median around it by this factor.
-_SHARE_OF_PEAKS, _PEAK = 0.25, 1.2
+_SHARE_OF_PEAKS, _PEAK = 0.5, 1.2
 
 
 def thinned(m: Measurements, most: int) -> Measurements:

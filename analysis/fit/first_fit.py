@@ -30,7 +30,7 @@ from instrument.geometry import FloatArray, Geometry
 # Local minima of a grid from which the search starts, and of one for MANY points.
 _MAX_STARTS, _STARTS_OF_MANY = 10, 5
 # Points from which on a part of them, so many, shows where the minima are.
-_VERY_MANY, _PART = 4000, 2000
+_VERY_MANY, _PART = 4000, 1000
 # Minima of the part whose chi2 there is above the lowest by no more than this fraction may be the
 # deepest of all points; so many of them are looked at.
 _NEAR, _LOOKED_AT = 0.1, 3
