@@ -8,8 +8,6 @@ functional form alone, 1.2 ms. The limits are ratios to lmfit, or of one choice 
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable
 from dataclasses import replace
 
 import lmfit
@@ -92,28 +90,6 @@ def test_the_ladder_and_an_exact_candidate_cost_a_few_lmfit_fits(scan: Measureme
     )
     assert choices[-1].verdict == "none adequate"
     assert ratio < 10
-
-
-NUMBER = itertools.count()
-
-
-def fresh(model: str, gradient: bool) -> Callable[[], object]:
-    """Evaluation of a model at parameters of its own each time, perhaps with its derivatives."""
-
-    def evaluate() -> None:
-        off = 1e-6 * next(NUMBER)
-        values = {p.name: p.default * (1 + off) for p in MODELS[model].parameters}
-        MODELS[model].brdf(GEOMETRY, **values)
-        if gradient:
-            MODELS[model].gradient(GEOMETRY, **values)
-
-    return evaluate
-
-
-# 2.0 and 1.5; without what the derivatives share with the value 4 and 2.2.
-@pytest.mark.parametrize(("model", "most"), [("wolff", 3.0), ("beckmann_spizzichino", 1.85)])
-def test_the_derivatives_of_a_costly_model_share_its_terms(model: str, most: float) -> None:
-    assert cpu_ratio(fresh(model, gradient=True), fresh(model, gradient=False), 40) < most
 
 
 def test_the_functional_model_is_fast() -> None:

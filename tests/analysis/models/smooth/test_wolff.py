@@ -11,11 +11,11 @@ import pytest
 from scipy.integrate import IntegrationWarning, quad
 
 from analysis.models import MODELS
+from analysis.models.smooth import internal_return
 from analysis.models.smooth.chandrasekhar import (
     h_exact,
 )
 from analysis.models.smooth.fresnel import unpolarised, wolff_polynomial
-from analysis.models.smooth.internal_return import internal_return
 from analysis.models.smooth.wolff import wolff_brdf
 from instrument.geometry import FloatArray, Geometry
 from tests.support.models.derivatives import central_difference
@@ -74,7 +74,7 @@ def test_the_printed_formula_to_1e_7(rho: float, n: float) -> None:
 def test_the_series_in_ln_mu_is_as_good_as_the_integrals(rho: float, n: float) -> None:
     theta = np.array([0.0, 10, 40, 70, 85, 89.9])
     mu = np.sqrt(1 - (np.sin(np.radians(theta)) / n) ** 2)
-    K, H = internal_return(mu, rho, n), h_exact(mu, rho)
+    K, H = internal_return.internal_return(mu, rho, n), h_exact(mu, rho)
     geometry = Geometry.from_degrees(theta_i=theta, theta_r=theta)
     found = MODELS["wolff"].brdf(geometry, single_scattering_albedo=rho, n=n)
     T = 1 - unpolarised(np.radians(theta), n)
@@ -186,3 +186,16 @@ def test_it_has_a_value_at_every_index() -> None:
     assert index.size > 10
     for n in index[::5]:
         assert MODELS["wolff"].brdf(mirror, single_scattering_albedo=0.5, n=float(n)) > 0
+
+
+@pytest.mark.parametrize("size", [20, 500])  # K by its integral, and by a series
+def test_what_a_value_needs_inside_serves_its_derivatives(size: int) -> None:
+    """F and H at the nodes of K's integral are most of the cost of either."""
+    geometry = Geometry.from_degrees(theta_i=30.0, theta_r=np.linspace(-75, 75, size))
+    internal_return._inside.cache_clear()
+    internal_return._h_inside.cache_clear()
+    for number, n in enumerate((1.3, 1.4), 1):
+        MODELS["wolff"].brdf(geometry, single_scattering_albedo=0.8, n=n)
+        MODELS["wolff"].gradient(geometry, single_scattering_albedo=0.8, n=n)
+        assert internal_return._inside.cache_info().misses == number
+        assert internal_return._h_inside.cache_info().misses == number
