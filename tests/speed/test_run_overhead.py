@@ -80,7 +80,7 @@ def test_the_demonstration_costs_a_few_times_the_import_of_its_libraries(
     The interlocks take 1.7 s of it, 15 ms for each series of frames: they look at its picture. The
     report's charts, drawn for two widths, take 1.2 s. A busy machine slows the parts unequally.
     Without --slow with a sixth of the points and small pictures: what is left is not the scan, and
-    takes some 3 times the imports, on a busy machine up to 6.
+    takes some 3 times the imports, on a busy machine up to 6, as each is measured once.
     """
     found = []
     protocol = CONFIGS / "protocols" / "demo.yaml" if slow else small_demo(tmp_path)
@@ -93,4 +93,4 @@ def test_the_demonstration_costs_a_few_times_the_import_of_its_libraries(
     for name, value in figures.items():
         record_property(name, f"{value:.2f}")
         sys.stdout.write(f"{name} {value:.2f}\n")
-    assert cpu_s < (10 if slow else 8) * libraries
+    assert cpu_s < 10 * libraries
