@@ -66,7 +66,6 @@ class Flights:
     _brightest: float = field(default=0.0, init=False)  # counts per second in the last sweep
     _contradicted: set[int] = field(default_factory=set, init=False)
     _pace: float = field(default=1.0, init=False)
-    _exposure_s: float = field(default=0.0, init=False)  # of the last turn; 0: of none yet
     _sweep: Sequence[Step] = field(default=(), init=False)
     _done: set[int] = field(default_factory=set, init=False)  # of the sweep's steps
 
@@ -90,7 +89,7 @@ class Flights:
         self._require_no_pause()
         self.begin_step(steps[0])
         try:
-            exposure_s = self._exposure_s = self._prepare(steps)
+            exposure_s = self._prepare(steps)
             latency = self._latencies.get(exposure_s) or self._calibrated(exposure_s)
             flight = self._flight([step.pose for step in steps], exposure_s)
             self.positioner.move_to(flight.start)
@@ -107,7 +106,7 @@ class Flights:
         The run-up is that of the exposure before: if the light allows it again, the axis is there.
         """
         first = steps[0]
-        likely_s = self._exposure_s or first.expected_exposure_s
+        likely_s = self.exposer.set_s or first.expected_exposure_s  # 0 before the first turn
         flight = self._flight([s.pose for s in steps], likely_s)
         self.positioner.move_to(flight.start)
         window = self.reduction.window(flight.start)
