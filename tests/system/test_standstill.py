@@ -19,8 +19,10 @@ from tests.support.timing.deadline import wait_for
 from tests.support.timing.standstill import (
     KEPT_WAITING_S,
     STARVED_S,
+    STOLEN_S,
     TRIES,
     Standstills,
+    stolen_s,
     waited_s,
 )
 
@@ -144,11 +146,36 @@ def test_short_waits_of_several_threads_in_turn_are_a_standstill(
     monkeypatch.setattr(standstill, "threads_waited_s", lambda _: dict(looks[0]))
     with Standstills() as standstills:
         for look in looks[1:]:
-            seen = standstills.looked
             looks[0] = look
-            wait_for(partial(_has_looked, standstills, seen + 2), "two looks")
+            _look_twice(standstills)
     assert standstills.kept_waiting_s == pytest.approx(0.12)
     assert standstills.cause
+
+
+def test_a_processor_that_the_host_takes_away_is_a_standstill(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """From one processor at once; the others have lost as much in their whole life."""
+    table = tmp_path / "stat"
+    monkeypatch.setattr(standstill, "_PROCESSORS", table)
+    line = "cpu{0} 11 12 13 14 15 16 17 {1} 19 20\n"
+    table.write_text(line.format("", 9) + line.format(0, 4) + line.format(1, 5) + "intr 1 2\n")
+    per_s = os.sysconf("SC_CLK_TCK")
+    assert stolen_s() == {0: 4 / per_s, 1: 5 / per_s}
+    with Standstills() as standstills:
+        _look_twice(standstills)
+        assert standstills.stolen_s == 0.0
+        later = tmp_path / "later"
+        later.write_text(line.format(0, 4) + line.format(1, 5 + round(0.16 * per_s)))
+        later.replace(table)  # at once: it is being read
+        _look_twice(standstills)
+    assert standstills.stolen_s == pytest.approx(0.16)
+    assert standstills.stolen_s > STOLEN_S
+    assert standstills.cause
+
+
+def _look_twice(standstills: Standstills) -> None:
+    wait_for(partial(_has_looked, standstills, standstills.looked + 2), "two looks")
 
 
 def _has_looked(standstills: Standstills, times: int) -> bool:

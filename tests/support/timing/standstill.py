@@ -5,7 +5,9 @@ the test process gets no processor for longer than that, both miss theirs, and a
 nothing about the program. A thread measures such standstills, one long one or many short ones in a
 row. It sleeps most of the time, and so is served before one that computes: for the other threads of
 the test, and for the processes that it started, the kernel's own count tells how long they were
-ready to run and did not.
+ready to run and did not. A thread that runs on a virtual machine's processor stands still where the
+host takes that processor away; the thread that measures may run on another, and the kernel counts
+this time apart.
 A test in real time that failed in a standstill is repeated, and the summary of the test run says
 so. A failure without one counts.
 """
@@ -34,8 +36,11 @@ LATE_S, WITHIN_S = 0.1, 0.5
 KEPT_WAITING_S = 0.1
 # Of WITHIN_S, for a thread of a process of the test: two busy programs leave it half of the time.
 STARVED_S = 0.3
+STOLEN_S = 0.05  # of WITHIN_S, from one processor, as STANDSTILL_S
 _TICK_S, _LOOK_S = 0.01, 0.1  # of the own thread; between two looks at other processes
 _PROPERTY = "repeated"
+_PROCESSORS = Path("/proc/stat")
+_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
 
 class Standstills(Closeable):
@@ -43,14 +48,17 @@ class Standstills(Closeable):
 
     longest_s: the longest. late_s: the largest sum of those within WITHIN_S. kept_waiting_s,
     starved_s: the longest time within WITHIN_S for which all threads of the test together, or one
-    of a child process, were kept from running. looks: the last looks at the threads of children;
-    looked: number of all.
+    of a child process, were kept from running. stolen_s: the longest time within WITHIN_S for which
+    the host took one processor away. looks: the last looks at the threads of children; looked:
+    number of all.
     """
 
     def __init__(self) -> None:
-        self.longest_s = self.late_s = self.kept_waiting_s = self.starved_s = 0.0
+        self.longest_s = self.late_s = 0.0
+        self.kept_waiting_s = self.starved_s = self.stolen_s = 0.0
         self.looks: deque[dict[int, float]] = deque(maxlen=1 + round(WITHIN_S / _LOOK_S))
         self.looked = 0
+        self._stolen: deque[dict[int, float]] = deque([stolen_s()], maxlen=self.looks.maxlen)
         self._own_waits_s: deque[float] = deque(maxlen=round(WITHIN_S / _LOOK_S))
         self._waited_s = threads_waited_s(os.getpid())
         self._done = threading.Event()
@@ -82,6 +90,8 @@ class Standstills(Closeable):
     def _look_at_threads(self) -> None:
         self.looks.append(waited_s(os.getpid()))
         self.starved_s = max(self.starved_s, _longest_s(self.looks))
+        self._stolen.append(stolen_s())
+        self.stolen_s = max(self.stolen_s, _longest_s(self._stolen))
         before, now = self._waited_s, threads_waited_s(os.getpid())
         now.pop(threading.get_native_id(), None)  # this one wakes often, and is in nobody's way
         self._own_waits_s.append(sum(s - before.get(thread, 0.0) for thread, s in now.items()))
@@ -98,6 +108,8 @@ class Standstills(Closeable):
             return f"{self.late_s:.2f} s of {WITHIN_S} s"
         if self.kept_waiting_s > KEPT_WAITING_S:
             return f"{self.kept_waiting_s:.2f} s of {WITHIN_S} s, in its threads"
+        if self.stolen_s > STOLEN_S:
+            return f"{self.stolen_s:.2f} s of {WITHIN_S} s, taken by the host of a virtual machine"
         starved = f"{self.starved_s:.2f} s of {WITHIN_S} s, in a process of the test"
         return starved if self.starved_s > STARVED_S else ""
 
@@ -123,10 +135,24 @@ def threads_waited_s(process: int) -> dict[int, float]:
     return found
 
 
+def stolen_s() -> dict[int, float]:
+    """Return for how long the host has taken each processor away, in s; none where it is not told.
+
+    Eighth number of a processor's line in /proc/stat (Linux, filesystems/proc.rst: steal), in
+    ticks.
+    """
+    lines = [line.split() for line in _PROCESSORS.read_text().splitlines()]
+    return {
+        int(words[0].removeprefix("cpu")): int(words[8]) / _TICKS_PER_S
+        for words in lines
+        if words[0][:3] == "cpu" and words[0] != "cpu"
+    }
+
+
 def _longest_s(looks: deque[dict[int, float]]) -> float:
-    """Longest time that a thread has waited between the first and the last look."""
+    """Longest increase of one thread's or processor's time between the first and the last look."""
     first, last = looks[0], looks[-1]
-    return max((waited - first.get(thread, 0.0) for thread, waited in last.items()), default=0.0)
+    return max((waited - first.get(number, 0.0) for number, waited in last.items()), default=0.0)
 
 
 def _children(process: int) -> list[int]:
