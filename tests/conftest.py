@@ -74,7 +74,8 @@ def pytest_collection() -> Generator[None, object, object]:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Hardware stays untouched unless somebody stands by and has said so."""
+    """Long tests come first. Hardware stays untouched unless somebody stands by and has said so."""
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
     if config.getoption("--allow-motion"):
         return
     refused = pytest.mark.skip(reason="real devices: not without --allow-motion")

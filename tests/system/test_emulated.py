@@ -31,6 +31,7 @@ from tests.support.whole_scans.simulated_rig import (
 )
 
 pytestmark = [
+    pytest.mark.long,
     pytest.mark.real_time,
     pytest.mark.skipif(
         shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"

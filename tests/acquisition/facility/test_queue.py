@@ -26,6 +26,7 @@ pytest.importorskip(
     "bluesky_queueserver", reason="bluesky-queueserver is not installed: gonio[queueserver]"
 )
 zmq = pytest.importorskip("zmq")
+pytestmark = pytest.mark.long
 DEADLINE_S = 120.0
 
 

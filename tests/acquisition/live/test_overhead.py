@@ -29,9 +29,12 @@ from tests.support.scans import TWO_MODELS, small_demo
 from tests.support.whole_scans.simulated_rig import EMULATED_RIG, quick_emulated_rig
 
 pytest.importorskip("uvicorn", reason="the live page's libraries are not installed")
-pytestmark = pytest.mark.skipif(
-    shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"
-)
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(
+        shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"
+    ),
+]
 MOST = 1.02  # of the time of a scan that nobody watches
 MOST_OF_ONE = 1.6  # of one pair of short scans: 0.77 to 1.25 beside other work
 

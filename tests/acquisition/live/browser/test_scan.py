@@ -27,6 +27,7 @@ else:
     from playwright.sync_api import expect
 
 pytestmark = [
+    pytest.mark.long,
     pytest.mark.real_time,
     pytest.mark.skipif(
         shutil.which("cc") is None, reason="the emulated camera needs a C compiler (cc)"
