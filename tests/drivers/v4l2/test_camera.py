@@ -175,18 +175,21 @@ def test_an_exposure_longer_than_the_time_out_of_opencv(
 def test_a_frame_costs_less_than_two_milliseconds(remote: RemoteCamera, scene: LevelScene) -> None:
     """At 200 frames a second no frame is lost: the period is the sensor's own.
 
-    The best of five: what else runs on this machine only adds. Measured at 512 x 480 pixels: a
-    period 0.01 ms beyond the sensor's, a frame in hand 1.4 ms after the end of its read-out.
+    The best of up to twenty: what else runs on this machine only adds. Measured at 512 x 480
+    pixels: a period 0.01 ms beyond the sensor's, a frame in hand 1.4 ms after the end of its
+    read-out.
     """
     with served(remote, scene):
         remote.ask("open", replace(SETTINGS, width_px=512, height_px=480))
-        beyond_s, late_s = [], []
-        for _ in range(5):
+        beyond_s = late_s = np.inf
+        for _ in range(20):
             taken_s = np.array(remote.ask("times_s", 50))
-            beyond_s.append(abs(np.ptp(taken_s[:, 0]) / 49 - 1 / 200))
-            late_s.append(np.median(taken_s[:, 0] - taken_s[:, 1]))
-        assert min(beyond_s) < 1e-3
-        assert min(late_s) < 2e-3
+            beyond_s = min(beyond_s, abs(np.ptp(taken_s[:, 0]) / 49 - 1 / 200))
+            late_s = min(late_s, np.median(taken_s[:, 0] - taken_s[:, 1]))
+            if beyond_s < 1e-3 and late_s < 2e-3:
+                break
+        assert beyond_s < 1e-3
+        assert late_s < 2e-3
 
 
 def test_device_model_and_opencv_in_one_process(remote: RemoteCamera) -> None:
