@@ -13,8 +13,9 @@ import pytest
 
 from acquisition.live import channel
 from instrument.record.event_kinds import DRIFT, OPERATOR, STOPPED
-from instrument.record.record import FILE_NAME, Record
+from instrument.record.record import Record
 from tests.support.command import gonio_here
+from tests.support.live.live_scan import channel_of_scan
 from tests.support.paths import CONFIGS, ROOT
 from tests.support.scans import TWO_MODELS, small_demo
 from tests.support.terminal.session import TerminalSession
@@ -39,7 +40,7 @@ def scanning(run: Path) -> Iterator[tuple[subprocess.Popen[str], Path]]:
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
         try:
-            folder = the_channel_of(run)
+            folder = channel_of_scan(run)
             assert channel.send(folder, channel.PAUSE) == channel.OK
             yield process, folder
         finally:
@@ -54,13 +55,6 @@ def paused_at_a_terminal(run: Path) -> Iterator[TerminalSession]:
         session.press("p")
         session.read_until("paused at theta_i ", LONG_S)
         yield session
-
-
-def the_channel_of(run: Path) -> Path:
-    wait_for((run / FILE_NAME).exists, "the record", LONG_S)
-    folder = channel.channel_of(run / FILE_NAME)
-    wait_for((folder / channel.SOCKET_FILE).exists, "the channel", LONG_S)
-    return folder
 
 
 def phase(folder: Path) -> str:

@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from acquisition.live.channel import SOCKET_FILE, channel_of
+from instrument.record.record import FILE_NAME
 from tests.support.paths import ROOT
 from tests.support.timing.deadline import wait_for
 
@@ -38,6 +40,14 @@ class LiveScan:
     def exit_code(self) -> int:
         """Wait until it has ended."""
         return self.process.wait(DEADLINE_S)
+
+
+def channel_of_scan(run: Path) -> Path:
+    """Wait for the channel of a scan that is being started, and return its folder."""
+    wait_for((run / FILE_NAME).exists, "the record", DEADLINE_S)
+    folder = channel_of(run / FILE_NAME)
+    wait_for((folder / SOCKET_FILE).exists, "the channel", DEADLINE_S)
+    return folder
 
 
 @contextmanager
