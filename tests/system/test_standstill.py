@@ -174,6 +174,16 @@ def test_a_processor_that_the_host_takes_away_is_a_standstill(
     assert standstills.cause
 
 
+def test_where_no_table_of_processors_is_none_is_taken_away(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(standstill, "_PROCESSORS", tmp_path / "none")
+    assert stolen_s() == {}
+    with Standstills() as standstills:
+        _look_twice(standstills)
+    assert standstills.stolen_s == 0.0
+
+
 def _look_twice(standstills: Standstills) -> None:
     wait_for(partial(_has_looked, standstills, standstills.looked + 2), "two looks")
 

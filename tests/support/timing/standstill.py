@@ -84,10 +84,10 @@ class Standstills(Closeable):
             self.late_s = max(self.late_s, sum(delay for _, delay in delays_s))
             if now_s - looked_s >= _LOOK_S:
                 looked_s = now_s
-                self._look_at_threads()
-        self._look_at_threads()
+                self._look()
+        self._look()
 
-    def _look_at_threads(self) -> None:
+    def _look(self) -> None:
         self.looks.append(waited_s(os.getpid()))
         self.starved_s = max(self.starved_s, _longest_s(self.looks))
         self._stolen.append(stolen_s())
@@ -141,12 +141,13 @@ def stolen_s() -> dict[int, float]:
     Eighth number of a processor's line in /proc/stat (Linux, filesystems/proc.rst: steal), in
     ticks.
     """
-    lines = [line.split() for line in _PROCESSORS.read_text().splitlines()]
-    return {
-        int(words[0].removeprefix("cpu")): int(words[8]) / _TICKS_PER_S
-        for words in lines
-        if words[0][:3] == "cpu" and words[0] != "cpu"
-    }
+    found: dict[int, float] = {}
+    with suppress(OSError):  # another system than Linux
+        for line in _PROCESSORS.read_text().splitlines():
+            name, *numbers = line.split()
+            if name.startswith("cpu") and name != "cpu":  # the first line is the sum of all
+                found[int(name.removeprefix("cpu"))] = int(numbers[7]) / _TICKS_PER_S
+    return found
 
 
 def _longest_s(looks: deque[dict[int, float]]) -> float:
