@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import select
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -14,10 +16,12 @@ from pathlib import Path
 import pytest
 
 from tests.support.paths import ROOT
-from tests.support.timing import standstill
+from tests.support.timing import looped_terminal, standstill
 from tests.support.timing.deadline import wait_for
+from tests.support.timing.looped_terminal import LoopedTerminal
 from tests.support.timing.standstill import (
     KEPT_WAITING_S,
+    STANDSTILL_S,
     STARVED_S,
     STOLEN_S,
     TRIES,
@@ -28,7 +32,7 @@ from tests.support.timing.standstill import (
 
 CONFTEST = """
 import pytest
-from tests.support.timing import standstill
+from tests.support.timing import looped_terminal, standstill
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "waits: in real time")
@@ -182,6 +186,34 @@ def test_where_no_table_of_processors_is_none_is_taken_away(
     with Standstills() as standstills:
         _look_twice(standstills)
     assert standstills.stolen_s == 0.0
+
+
+def test_bytes_that_a_pseudo_terminal_holds_are_a_standstill() -> None:
+    """The kernel's thread that carries them waits, and every thread of the test runs."""
+    with Standstills() as standstills:
+        _, port = standstills.terminal.ends
+        termios.tcflow(port, termios.TCOOFF)
+        held_s = time.monotonic()
+        wait_for(lambda: time.monotonic() - held_s > 4 * STANDSTILL_S, "a while")
+        termios.tcflow(port, termios.TCOON)
+        _look_twice(standstills)
+    assert standstills.longest_s > 2 * STANDSTILL_S
+    assert standstills.cause
+
+
+def test_a_byte_that_never_arrives_does_not_hold_the_test(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A terminal that waits for whole lines hands out no single byte."""
+    monkeypatch.setattr(looped_terminal, "GIVEN_UP_S", STANDSTILL_S)
+    with LoopedTerminal() as terminal:
+        controller, port = terminal.ends
+        settings = termios.tcgetattr(port)
+        settings[3] |= termios.ICANON
+        termios.tcsetattr(port, termios.TCSANOW, settings)
+        begun_s = time.monotonic()
+        terminal.exchange()
+        assert time.monotonic() - begun_s > STANDSTILL_S
+        assert not select.select([controller], [], [], 0)[0]  # the other byte has arrived
+    terminal.close()
 
 
 def _look_twice(standstills: Standstills) -> None:

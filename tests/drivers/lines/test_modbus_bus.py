@@ -34,10 +34,10 @@ from tests.support.stages.waiting import wait_until
 
 pytestmark = pytest.mark.waits
 
-REPLY_S = 0.05
+REPLY_S = 0.07  # a delayed answer still has as long as counts as a standstill
 FAULTS = {
     "drop": Fault("drop"),
-    "delay": Fault("delay", 0.5 * REPLY_S),
+    "delay": Fault("delay", 0.2 * REPLY_S),
     "late": Fault("late", 1.5 * REPLY_S),
     "later than the quiet": Fault("late", 2.4 * REPLY_S),
     "much later": Fault("late", 4.0 * REPLY_S),

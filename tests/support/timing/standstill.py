@@ -3,11 +3,13 @@
 Emulated controllers answer within the real ones' times, and drivers have the real time-outs. Where
 the test process gets no processor for longer than that, both miss theirs, and a failure says
 nothing about the program. A thread measures such standstills, one long one or many short ones in a
-row. It sleeps most of the time, and so is served before one that computes: for the other threads of
-the test, and for the processes that it started, the kernel's own count tells how long they were
-ready to run and did not. A thread that runs on a virtual machine's processor stands still where the
-host takes that processor away; the thread that measures may run on another, and the kernel counts
-this time apart.
+row. It also sends bytes through a pseudo-terminal, as the drivers and the controllers do: the
+kernel's thread that carries them may be kept from running while all of the test's own threads run.
+The thread that measures sleeps most of the time, and so is served before one that computes: for the
+other threads of the test, and for the processes that it started, the kernel's own count tells how
+long they were ready to run and did not. A thread that runs on a virtual machine's processor stands
+still where the host takes that processor away; the thread that measures may run on another, and the
+kernel counts this time apart.
 A test in real time that failed in a standstill is repeated, and the summary of the test run says
 so. A failure without one counts.
 """
@@ -25,15 +27,16 @@ import pytest
 from _pytest.runner import runtestprotocol
 
 from instrument.closeable import Closeable
+from tests.support.timing.looped_terminal import LoopedTerminal
 
 MARKS = ("waits", "real_time")
 TRIES = 4
-STANDSTILL_S = 0.05  # a third of the shortest time-out of a reply
+STANDSTILL_S = 0.05  # the shortest time-out of a reply in these tests is 0.07 s
 # Short ones in a row: a fifth of the time for which a moving stage may be silent.
 LATE_S, WITHIN_S = 0.1, 0.5
 # Of WITHIN_S, for all threads of the test: a request passes through several of them, one after the
 # other, before its answer is read. The shortest time-out of a reply.
-KEPT_WAITING_S = 0.1
+KEPT_WAITING_S = 0.07
 # Of WITHIN_S, for a thread of a process of the test: two busy programs leave it half of the time.
 STARVED_S = 0.3
 STOLEN_S = 0.05  # of WITHIN_S, from one processor, as STANDSTILL_S
@@ -44,13 +47,13 @@ _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
 
 class Standstills(Closeable):
-    """Delays of a thread that wakes every 10 ms, within a `with` block.
+    """Delays of a thread that wakes and exchanges two bytes every 10 ms, within a `with` block.
 
     longest_s: the longest. late_s: the largest sum of those within WITHIN_S. kept_waiting_s,
     starved_s: the longest time within WITHIN_S for which all threads of the test together, or one
     of a child process, were kept from running. stolen_s: the longest time within WITHIN_S for which
-    the host took one processor away. looks: the last looks at the threads of children; looked:
-    number of all.
+    the host took one processor away. terminal: what the bytes pass through. looks: the last
+    looks at the threads of children; looked: number of all.
     """
 
     def __init__(self) -> None:
@@ -61,6 +64,7 @@ class Standstills(Closeable):
         self._stolen: deque[dict[int, float]] = deque([stolen_s()], maxlen=self.looks.maxlen)
         self._own_waits_s: deque[float] = deque(maxlen=round(WITHIN_S / _LOOK_S))
         self._waited_s = threads_waited_s(os.getpid())
+        self.terminal = LoopedTerminal()
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._measure, daemon=True, name="standstills")
         self._thread.start()
@@ -69,12 +73,18 @@ class Standstills(Closeable):
         """Measure no more; may be called twice."""
         self._done.set()
         self._thread.join()
+        self.terminal.close()
+
+    def go_on(self) -> None:
+        """Measure a little longer: a thread's wait is counted only once it runs again."""
+        self._done.wait(WITHIN_S)
 
     def _measure(self) -> None:
         woken_s = time.monotonic()
         delays_s: deque[tuple[float, float]] = deque()
         looked_s = woken_s
         while not self._done.wait(_TICK_S):
+            self.terminal.exchange()
             now_s = time.monotonic()
             delay_s, woken_s = now_s - woken_s - _TICK_S, now_s
             self.longest_s = max(self.longest_s, delay_s)
@@ -180,6 +190,8 @@ def run_in_real_time(item: pytest.Item, nextitem: pytest.Item | None) -> None:
     while True:
         with Standstills() as standstills:
             reports = runtestprotocol(item, nextitem=nextitem, log=False)
+            if any(r.failed for r in reports):
+                standstills.go_on()
         cause = standstills.cause
         if not cause or len(causes) + 1 == TRIES or not any(r.failed for r in reports):
             break
