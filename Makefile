@@ -9,14 +9,14 @@ WAITING = $(shell grep -rl --include='test_*.py' 'pytest\.mark\.waits' tests)
 # A hundred processes start in a test run: without its bytecode each compiles the project anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test hil-emulated lint waiting compiled clean
+.PHONY: demo test hil-emulated lint waiting clean
 
 demo: $(VENV)/.installed
 	$(BIN)/gonio run configs/protocols/demo.yaml
 
 # Tests that wait for emulated devices leave most of the processor to the others, which yield it.
 test: $(VENV)/.installed-dev
-	$(MAKE) --no-print-directory -j 3 --output-sync=target compiled lint waiting
+	$(MAKE) --no-print-directory -j 3 --output-sync=target $(VENV)/.compiled lint waiting
 	$(BIN)/pytest -n auto --dist worksteal -m "not hil and not waits"
 
 waiting: $(VENV)/.installed-dev
@@ -26,10 +26,11 @@ waiting: $(VENV)/.installed-dev
 hil-emulated: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.hil_emulated $(OPTIONS)
 
-# Else each worker compiles all tests, in a fresh clone, at the same time as the others. What is wrong
-# with a file is said where its tests are run.
-compiled: $(VENV)/.installed-dev
+# Once in a fresh clone, where else each worker compiles all tests at the same time as the others.
+# What is wrong with a file is said where its tests are run.
+$(VENV)/.compiled: $(VENV)/.installed-dev
 	-@nice $(BIN)/pytest --collect-only -q -m "not hil and not waits" > /dev/null
+	touch $@
 
 lint: $(VENV)/.installed-dev
 	nice $(BIN)/ruff check .
