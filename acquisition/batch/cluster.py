@@ -84,17 +84,20 @@ def _at_once(
 
 
 def _results(waiting: dict[Any, Item]) -> Iterator[tuple[Item, Any]]:
-    """Yield results as they are done, and remove their futures from `waiting`."""
-    from distributed import KilledWorker, as_completed
+    """Yield results as they are done, and remove their futures from `waiting`.
+
+    A result that is lost with its worker before it was fetched is computed again, and waited for.
+    """
+    from distributed import CancelledError, KilledWorker, as_completed
 
     for future in as_completed(list(waiting)):
         item = waiting.pop(future)
-        if future.status in ("cancelled", "lost"):
-            raise DeviceError(_GONE)
         try:
             result = future.result()
         except KilledWorker as error:
             result = Lost(f"its workers ended each time: {_short(error)}")
+        except CancelledError as error:  # with the connection
+            raise DeviceError(_GONE) from error
         future.release()
         yield item, result
 

@@ -78,6 +78,25 @@ def test_an_item_that_always_ends_its_worker_is_lost_alone(tmp_path: Path, sched
     assert found[items[1]] == 1
 
 
+def test_a_result_that_is_lost_with_its_worker_is_computed_again(
+    tmp_path: Path, scheduler: str
+) -> None:
+    """It was done, and not fetched yet; no worker is there for a moment."""
+    items = [Item(n, tmp_path) for n in range(2)]
+    with connected(scheduler) as client, closing(on_cluster(squared, items, client)) as results:
+        found = [next(results)]
+        (other,) = set(items) - {found[0][0]}
+        wait_for(lambda: len(client.futures) == 1, "the release of the first result")
+        (future,) = client.futures.values()
+        wait_for(lambda: future.status == "finished", "the other result")
+        for worker in client.run(os.getpid).values():
+            os.kill(worker, signal.SIGKILL)
+        wait_for(lambda: future.status == "lost", "the loss")
+        found += results
+    assert sorted(found) == [(item, item.number**2) for item in items]
+    assert len(attempts(tmp_path, other.number)) == 2
+
+
 def test_a_stop_takes_back_what_waits(folder: Path, tmp_path: Path, scheduler: str) -> None:
     """A table that is a pipe without a writer is read for ever."""
     (tmp_path / "in").mkdir()
