@@ -31,8 +31,11 @@ from tests.support.timing.standstill import (
 )
 
 CONFTEST = """
-import pytest
-from tests.support.timing import looped_terminal, standstill
+import pathlib, pytest
+from tests.support.timing import standstill
+
+# A wait that is counted once a test has made a file.
+standstill.threads_waited_s = lambda _: {1: float(pathlib.Path("counted").exists())}
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "waits: in real time")
@@ -48,7 +51,7 @@ def pytest_terminal_summary(terminalreporter):
 """
 # `stand_still` keeps every other thread of the process waiting: a call that holds Python's lock.
 TESTS = """
-import ctypes, pathlib, pytest, time
+import ctypes, pathlib, pytest, threading, time
 
 def count(name):
     with pathlib.Path(name).open("a") as file:
@@ -73,6 +76,11 @@ def test_fails_once_in_short_standstills():
         for _ in range(10):
             ctypes.PyDLL(None).usleep(40_000)
             time.sleep(0.005)
+        assert not "failed"
+
+def test_fails_once_before_its_wait_is_counted():
+    if count("later") < 2:
+        threading.Timer(0.1, pathlib.Path("counted").touch).start()
         assert not "failed"
 
 @pytest.fixture(scope="module")
@@ -101,7 +109,7 @@ def test_passes_in_a_standstill():
     count("passes")
     stand_still()
 """
-NAMES = ("twice", "short", "shared", "always", "passes")
+NAMES = ("twice", "short", "later", "shared", "always", "passes")
 
 
 # One processor, of which the others leave the last next to nothing (sched(7): SCHED_IDLE).
@@ -259,9 +267,9 @@ def test_a_failure_in_a_standstill_is_repeated_and_any_other_counts(tmp_path: Pa
         cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
     times = {name: len((tmp_path / name).read_text()) for name in NAMES}
-    wanted = {"twice": 3, "short": 2, "shared": 3, "always": TRIES, "passes": 1}
+    wanted = {"twice": 3, "short": 2, "later": 2, "shared": 3, "always": TRIES, "passes": 1}
     assert times == wanted, done.stdout
-    assert "2 failed, 5 passed" in done.stdout
+    assert "2 failed, 6 passed" in done.stdout
     repeated = "test_fails_twice_in_a_standstill: repeated, as the machine stood still for 0."
     assert repeated in done.stdout
     if (

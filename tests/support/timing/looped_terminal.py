@@ -10,6 +10,7 @@ import fcntl
 import os
 import select
 import tty
+from contextlib import suppress
 
 from instrument.closeable import Closeable
 
@@ -23,7 +24,8 @@ class LoopedTerminal(Closeable):
         self.ends = controller, port = os.openpty()
         self._open = [controller, port]
         tty.setraw(port)
-        fcntl.flock(port, fcntl.LOCK_EX)
+        with suppress(BlockingIOError):  # a driver that has lost this number tries it, and goes
+            fcntl.flock(port, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
     def exchange(self) -> None:
         """Send a byte each way, as a question and its answer; return once both have arrived.
