@@ -16,9 +16,9 @@ from pathlib import Path
 import pytest
 
 from tests.support.paths import ROOT
-from tests.support.timing import looped_terminal, standstill
+from tests.support.timing import standstill
 from tests.support.timing.deadline import wait_for
-from tests.support.timing.looped_terminal import LoopedTerminal
+from tests.support.timing.looped_terminal import GIVEN_UP_S, LoopedTerminal
 from tests.support.timing.standstill import (
     KEPT_WAITING_S,
     STANDSTILL_S,
@@ -209,9 +209,8 @@ def test_bytes_that_a_pseudo_terminal_holds_are_a_standstill() -> None:
     assert standstills.cause
 
 
-def test_a_byte_that_never_arrives_does_not_hold_the_test(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_byte_that_never_arrives_does_not_hold_the_test() -> None:
     """A terminal that waits for whole lines hands out no single byte."""
-    monkeypatch.setattr(looped_terminal, "GIVEN_UP_S", STANDSTILL_S)
     with LoopedTerminal() as terminal:
         controller, port = terminal.ends
         settings = termios.tcgetattr(port)
@@ -219,7 +218,7 @@ def test_a_byte_that_never_arrives_does_not_hold_the_test(monkeypatch: pytest.Mo
         termios.tcsetattr(port, termios.TCSANOW, settings)
         begun_s = time.monotonic()
         terminal.exchange()
-        assert time.monotonic() - begun_s > STANDSTILL_S
+        assert time.monotonic() - begun_s > 0.9 * GIVEN_UP_S
         assert not select.select([controller], [], [], 0)[0]  # the other byte has arrived
     terminal.close()
 

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -91,10 +92,11 @@ def test_a_result_that_is_lost_with_its_worker_is_computed_again(
         wait_for(lambda: future.status == "finished", "the other result")
         for worker in client.run(os.getpid).values():
             os.kill(worker, signal.SIGKILL)
-        wait_for(lambda: future.status == "lost", "the loss")
+        again = partial(attempts, tmp_path, other.number)
+        wait_for(lambda: future.status == "lost" or len(again()) == 2, "the loss")
         found += results
     assert sorted(found) == [(item, item.number**2) for item in items]
-    assert len(attempts(tmp_path, other.number)) == 2
+    assert len(again()) == 2
 
 
 def test_a_stop_takes_back_what_waits(folder: Path, tmp_path: Path, scheduler: str) -> None:
