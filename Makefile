@@ -26,8 +26,8 @@ waiting: $(VENV)/.installed-dev
 hil-emulated: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.hil_emulated $(OPTIONS)
 
-# Once in a fresh clone, where else each worker compiles all tests at the same time as the others.
-# What is wrong with a file is said where its tests are run.
+# Once in a clone: otherwise each worker compiles all tests, at the same time as the others. Errors in
+# a test file are reported where its tests are run.
 $(VENV)/.compiled: $(VENV)/.installed-dev
 	-@nice $(BIN)/pytest --collect-only -q -m "not hil and not waits" > /dev/null
 	touch $@
