@@ -56,21 +56,30 @@ class Manager:
         self._address = address
 
     def ask(self, method: str, **parameters: object) -> dict[str, Any]:
-        told = self._answer(method, parameters)
-        assert told.get("success", True), told
+        told = self._answer(method, parameters, DEADLINE_S)
+        assert told.get("success"), told or f"{method}: no answer within {DEADLINE_S} s"
         return told
 
     def wait_for(self, key: str, *wanted: object) -> None:
         """Return once the manager's state has one of these values."""
-        wait_until(lambda: self._answer("status", {}).get(key) in wanted, DEADLINE_S)
+        wait_until(lambda: self._answer("status", {}, 1.0).get(key) in wanted, DEADLINE_S)
 
-    def _answer(self, method: str, parameters: dict[str, object]) -> dict[str, Any]:
-        """Answer to one request; empty if there is none within a second."""
+    def wait_for_plan(self, name: str) -> None:
+        """Return once the plan may be added: the manager reads the list after it is idle."""
+        wait_until(
+            lambda: name in self.ask("plans_allowed", user_group="primary")["plans_allowed"],
+            DEADLINE_S,
+        )
+
+    def _answer(
+        self, method: str, parameters: dict[str, object], within_s: float
+    ) -> dict[str, Any]:
+        """Answer to one request; empty if there is none in time."""
         with zmq.Context() as context, context.socket(zmq.REQ) as request:
             request.linger = 0
             request.connect(self._address)
             request.send_json({"method": method, "params": parameters})
-            return dict(request.recv_json()) if request.poll(1000) else {}
+            return dict(request.recv_json()) if request.poll(1e3 * within_s) else {}
 
 
 def block(name: str) -> str:
@@ -120,6 +129,7 @@ def test_two_protocols_are_measured_on_two_rigs(manager: Manager, tmp_path: Path
         jobs.append((small_demo(folder, "lambert"), rig, folder / "run"))
     manager.ask("environment_open")
     manager.wait_for("worker_environment_state", "idle")
+    manager.wait_for_plan("measure")
     for job in jobs:
         item = {"item_type": "plan", "name": "measure", "args": [str(path) for path in job]}
         manager.ask("queue_item_add", item=item, user="test", user_group="primary")
