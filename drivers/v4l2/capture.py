@@ -105,7 +105,8 @@ class Capture:
         if settings.gain is not None:
             self._controls.set(GAIN, settings.gain)
         self._controls.note_others()
-        self._buffers, self._next_buffer = buffer_count(self._video), 0
+        self._buffers = buffer_count(self._video)
+        self._next_buffer: int | None = None  # not 0: OpenCV drops the first frame of a stream
 
     @property
     def settings(self) -> dict[str, str]:
@@ -190,16 +191,17 @@ class Capture:
         return False
 
     def _filled_buffers(self) -> list[ioctl.Buffer]:
-        """Return the filled buffers not taken yet, or only the next one if it is filled.
+        """Return the filled buffers not taken yet, or only the next one if it is known and filled.
 
         Buffers are normally filled in order. A frame that is not in one of them is rejected.
         """
         if self._stream is None:
             return []
         try:
-            expected = ioctl.buffer_state(self._stream, self._next_buffer)
-            if expected.flags & ioctl.BUFFER_DONE:
-                return [expected]
+            if self._next_buffer is not None:
+                expected = ioctl.buffer_state(self._stream, self._next_buffer)
+                if expected.flags & ioctl.BUFFER_DONE:
+                    return [expected]
             states = [ioctl.buffer_state(self._stream, i) for i in range(self._buffers)]
         except OSError:
             return []  # the grab that follows fails, or its frame is rejected
@@ -214,6 +216,7 @@ class Capture:
             if abs(buffer.time_s - stamp_s) < _SAME_STAMP_S:
                 self._next_buffer = (buffer.index + 1) % self._buffers
                 return Arrival(stamp_s, _fault(buffer, needed), buffer.sequence)
+        self._next_buffer = None
         return Arrival(stamp_s, _NO_STATE if self.requires_buffer_state else "")
 
     def image(self) -> Image | None:

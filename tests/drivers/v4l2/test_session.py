@@ -50,6 +50,18 @@ def test_frames_have_the_numbers_of_their_buffers(remote: RemoteCamera, scene: L
         assert again < numbers[-1]
 
 
+def test_a_camera_opened_on_a_busy_computer_still_numbers_its_frames(
+    remote: RemoteCamera, scene: LevelScene
+) -> None:
+    """Old frames wait in all its buffers, among them that of the first frame, filled again."""
+    with served(remote, scene):
+        remote.ask("open_late", SETTINGS)
+        frames = remote.grab(2)
+        assert [f.sequence for f in frames] == [scene.exposure_of(f).sequence for f in frames]
+        assert remote.ask("settings")["frame numbers"] == "by the driver"
+        assert remote.ask("said") == []
+
+
 def test_frames_without_numbers_have_none(remote: RemoteCamera, scene: LevelScene) -> None:
     with served(remote, scene, reports_filled=False):
         remote.ask("open", SETTINGS)

@@ -20,9 +20,14 @@ import numpy as np
 
 from drivers.v4l2 import listing
 from drivers.v4l2.camera import V4l2Camera
+from drivers.v4l2.capture import Capture
+from drivers.v4l2.ioctl import BUFFER_DONE, buffer_state
+from drivers.v4l2.open_device import buffer_count
 from drivers.v4l2.settings import V4l2Settings
+from drivers.v4l2.worker_thread import Heartbeat
 from instrument.devices import Frame
 from instrument.errors import DeviceError
+from tests.support.timing.deadline import wait_for
 
 
 class MonotonicClock:
@@ -52,6 +57,17 @@ class Child:
     def open_blind(self, settings: V4l2Settings) -> str:
         """Open as if the descriptor that OpenCV streams on could not be identified."""
         with patch("drivers.v4l2.open_device._stream_descriptor", return_value=None):
+            return self.open(settings)
+
+    def open_late(self, settings: V4l2Settings) -> str:
+        """Open with the buffers full again once the stream has been started: a busy computer."""
+        start = Capture.start
+
+        def late_start(capture: Capture, heartbeat: Heartbeat) -> None:
+            start(capture, heartbeat)
+            wait_for(lambda: _filled(capture) >= buffer_count(capture._video) - 1, "full buffers")
+
+        with patch.object(Capture, "start", late_start):
             return self.open(settings)
 
     def ungated_grab(self, count: int) -> list[Frame]:
@@ -123,6 +139,12 @@ class Child:
     def answer(self, name: str, arguments: tuple[Any, ...]) -> Any:
         own = getattr(self, name, None)
         return (own or getattr(self.camera, name))(*arguments)
+
+
+def _filled(capture: Capture) -> int:
+    assert capture._stream is not None
+    states = [buffer_state(capture._stream, n) for n in range(buffer_count(capture._video))]
+    return sum(bool(state.flags & BUFFER_DONE) for state in states)
 
 
 def main() -> None:
