@@ -8,6 +8,7 @@ emulated camera belong to a process and need `gonio`.
 from __future__ import annotations
 
 import contextlib
+import faulthandler
 import os
 import signal
 import subprocess
@@ -17,7 +18,7 @@ from collections.abc import Iterator
 from functools import cache
 from io import TextIOWrapper
 from pathlib import Path
-from typing import IO
+from typing import IO, NoReturn
 from unittest.mock import patch
 
 from typer.main import get_command
@@ -54,6 +55,7 @@ def gonio_here(
     `encoding` of its standard streams, as a terminal's.
     """
     with contextlib.ExitStack() as stack:
+        stack.enter_context(_told_end())
         stack.enter_context(contextlib.chdir(cwd or Path.cwd()))
         nobody = stack.enter_context(Path(os.devnull).open())
         out, err = (stack.enter_context(tempfile.TemporaryFile()) for _ in range(2))
@@ -80,6 +82,20 @@ def _exit_code() -> int:
     except SystemExit as end:
         return int(end.code or 0)
     return 0
+
+
+@contextlib.contextmanager
+def _told_end() -> Iterator[None]:
+    """Show where a command ends the process, and with it the tests: on the tests' own stderr."""
+    end = os._exit
+    with os.fdopen(os.dup(2), "w") as stderr:
+
+        def told_end(code: int) -> NoReturn:
+            faulthandler.dump_traceback(stderr, all_threads=True)
+            end(code)
+
+        with patch("os._exit", told_end):
+            yield
 
 
 @contextlib.contextmanager

@@ -133,3 +133,29 @@ def test_a_signal_that_code_swallows_or_turns_into_an_error_still_stops(where: s
         process.send_signal(signal.SIGQUIT)
         out, err = process.communicate(timeout=DEADLINE_S)
     assert (out, err, process.returncode) == ("stopped by the operator (SIGQUIT)\n", "", 0)
+
+
+ENDING = """
+import signal
+from unittest.mock import patch
+from acquisition.terminal import stop_signals
+from tests.support import command
+
+def stopped_in_no_orderly_block():
+    stop_signals.begin()
+    signal.raise_signal(signal.SIGINT)
+
+with patch.object(command, "main", stopped_in_no_orderly_block):
+    command.gonio_here("run")
+"""
+
+
+def test_a_command_that_ends_the_process_of_the_tests_shows_where() -> None:
+    """Its own message is lost with its captured output."""
+    done = subprocess.run(
+        [sys.executable, "-c", ENDING], cwd=ROOT, text=True, capture_output=True, check=False,
+        timeout=DEADLINE_S,
+    )  # fmt: skip
+    assert done.returncode == 4
+    assert "stopped_in_no_orderly_block" in done.stderr
+    assert "in end_at_once" in done.stderr
