@@ -198,7 +198,7 @@ class Positioner:
         """Stop every axis and close the shutter, even if some of them fail.
 
         All stops are sent, that of what moves first, before it is waited until the axes were read
-        to stand. An action interrupted by a Ctrl-C is repeated, and the interruption is logged.
+        to stand. An action interrupted by a Ctrl-C is repeated, however often, and that is logged.
         """
         names = sorted(AXES, key=lambda name: name != self.moving)
         axes = [(name, self._axes[name]) for name in names if name in self._axes]
@@ -209,11 +209,20 @@ class Positioner:
         if self._rig.lamp.darkened_by == "shutter":
             actions.append(("lamp", self._lamp.darken))
         for name, action in actions:
-            try:
-                _attempt(name, action)
-            except KeyboardInterrupt:
+            _insist(name, action)
+
+
+def _insist(name: str, action: Callable[[], None]) -> None:
+    """Carry out an action, and again after each Ctrl-C: the stop may not have been sent."""
+    interrupted = False
+    while True:
+        try:
+            if interrupted:
                 log.error("%s: Ctrl-C while the rig was made safe: action repeated", name)
-                _attempt(name, action)  # the stop may not have been sent
+            _attempt(name, action)
+            return
+        except KeyboardInterrupt:
+            interrupted = True
 
 
 def _attempt(name: str, action: Callable[[], None]) -> None:

@@ -87,13 +87,15 @@ def undisturbed() -> tuple[Reading, ...]:
 class Tripwire:
     """Passes every device call; raises `error` at the first suitable call after number `at`.
 
-    `impatient`: raise one more Ctrl-C at the first stop after that.
+    `impatient`: raise so many more Ctrl-C, at the first stops after that. tripped: the call at
+    which the error was raised.
     """
 
     at: int = BEYOND_END
     error: BaseException | None = None
-    impatient: bool = False
+    impatient: int = 0
     calls: list[str] = field(default_factory=list)
+    tripped: str = ""
     dead: bool = False
 
     def around(self, name: str, device: object) -> Any:
@@ -106,18 +108,22 @@ class Tripwire:
         self.calls.append(name)
         error = self.error
         if len(self.calls) > self.at and error is not None and self._fits(name, error):
-            self.error, self.dead = None, isinstance(error, Killed)
+            self.error, self.tripped, self.dead = None, name, isinstance(error, Killed)
             raise error
         if error is None and self.impatient and name.endswith("_stop"):
-            self.impatient = False
+            self.impatient -= 1
             raise KeyboardInterrupt
 
     def _fits(self, name: str, error: BaseException) -> bool:
         """Only the operator refuses; a device error during the safe stop does not end a scan."""
         if isinstance(error, OperatorStop):
             return name == "operator.ask"
-        made_safe = name.endswith("_stop") or name == "lamp.darken"
-        return not (isinstance(error, DeviceError) and made_safe)
+        return not (isinstance(error, DeviceError) and makes_safe(name))
+
+
+def makes_safe(call: str) -> bool:
+    """Return True for the calls of which the end of a scan consists."""
+    return call.endswith("_stop") or call == "lamp.darken"
 
 
 class _Wired:
@@ -185,11 +191,11 @@ class ScanMachine(RuleBasedStateMachine):
     def complete(self) -> bool:
         return len(self.record.readings()) == len(tiny_plan().steps)
 
-    def run(self, end: str | None, at: int = BEYOND_END, impatient: bool = False) -> None:
+    def run(self, end: str | None, at: int = BEYOND_END, impatient: int = 0) -> None:
         """Scan or resume, as the commands do, until a device call ends it."""
         loaded, before = tiny_scan(), Progress.of(self.record) if self.begun else None
         self.begun = True
-        self.wire = Tripwire(at, ENDS[end]() if end else None, impatient and end is not None)
+        self.wire = Tripwire(at, ENDS[end]() if end else None, impatient if end else 0)
         with (
             patch("acquisition.commands.scan_session.open_devices", self._opened),
             patch("acquisition.commands.scan_session.Engine", self._made),
@@ -201,10 +207,15 @@ class ScanMachine(RuleBasedStateMachine):
                 how, raised = end or "", error
             else:
                 how, raised = "", None
-        tripped = end is not None and self.wire.error is None
-        assert (type(raised), how) == ((RAISED[end], end) if end and tripped else (type(None), ""))
+        expected = (RAISED[end], end) if end and self._came_in_time(end) else (type(None), "")
+        assert (type(raised), how) == expected
         self._ended(how)
         self._left_safe()
+
+    def _came_in_time(self, end: str) -> bool:
+        """False without an error, and for a Ctrl-C once all is measured and the rig made safe."""
+        late = end == "stopped" and makes_safe(self.wire.tripped) and self.complete
+        return bool(self.wire.tripped) and not late
 
     def _opened(self, loaded: Loaded) -> Devices:
         return wired(open_devices(loaded), self.wire)
@@ -233,8 +244,8 @@ class ScanMachine(RuleBasedStateMachine):
         assert lamp[-1] == "lamp.darken"
 
     @precondition(lambda self: not self.complete)
-    @rule(end=st.sampled_from(list(ENDS)), at=st.integers(0, 150), impatient=st.booleans())
-    def scan_until(self, end: str, at: int, impatient: bool) -> None:
+    @rule(end=st.sampled_from(list(ENDS)), at=st.integers(0, 150), impatient=st.integers(0, 3))
+    def scan_until(self, end: str, at: int, impatient: int) -> None:
         self.run(end, at, impatient)
 
     @precondition(lambda self: self.engine is not None)
