@@ -97,11 +97,12 @@ def suspected_mistake(first: Sequence[FirstFit], m: Measurements) -> Suspected |
     """
     part = _thinned(m)
     needed = _FEWEST_PER_PARAMETER * len(MODELS[_MODEL].parameters)
-    if part.size < needed or not enough_points(MODELS[_MODEL], part):
+    own = _fit_of(part) if part.size >= needed else None
+    if own is None:
         return None
     fits = [f for f in first if f.solution.converged]
-    as_given = min((_misfit(f), _rms(f)) for f in (*fits, FirstFits(part).of(MODELS[_MODEL])))
-    undone = [(_undone(mistake, part), mistake) for mistake in _possible(m)]
+    as_given = min((_misfit(f), _rms(f)) for f in (*fits, own))
+    undone = [(_fit_of(mistake.undo(part)), mistake) for mistake in _possible(m)]
     found = [(fit, mistake) for fit, mistake in undone if fit is not None]
     found.sort(key=lambda one: _misfit(one[0]))
     if not found or not _clearly_better(found[0][0], as_given[0]):
@@ -133,10 +134,11 @@ def _possible(m: Measurements) -> list[_Mistake]:
     return found
 
 
-def _undone(mistake: _Mistake, m: Measurements) -> FirstFit | None:
-    changed = mistake.undo(m)
+def _fit_of(m: Measurements) -> FirstFit | None:
+    """First fit of the model; None for too few points, or for a part of them that has no light."""
     model = MODELS[_MODEL]
-    return FirstFits(changed).of(model) if enough_points(model, changed) else None
+    lit = enough_points(model, m) and np.mean(m.brdf) > 0
+    return FirstFits(m).of(model) if lit else None
 
 
 def _clearly_better(fit: FirstFit, as_given: float) -> bool:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.choice.adequacy import agreement
+from analysis.choice.checks.relative_size import relative_size
 from analysis.choice.runs_test import runs_probability
 from analysis.data.acceptance import Acceptance
 from analysis.data.measurements import Measurements
@@ -140,9 +141,9 @@ def _stand_out(fit: FirstFit, m: Measurements) -> BoolArray:
     """
     sizes = [_sizes(fit, m)]
     if m.u_random is None:
-        predicted = np.abs(fit.problem.predict(fit.solution.x))
-        sizes.append(sizes[0] / np.maximum(predicted, np.finfo(float).tiny))
-    far = [size > _STAND_OUT * np.median(size) for size in sizes]
+        sizes.append(relative_size(sizes[0], fit.problem.predict(fit.solution.x)))
+    with np.errstate(over="ignore"):  # no size is above a limit beyond a double
+        far = [size > _STAND_OUT * np.median(size) for size in sizes]
     return np.asarray(np.logical_and.reduce(far))
 
 

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from analysis.choice.checks.relative_size import relative_size
 from analysis.data.covariance import Covariance, full_covariance
 from analysis.data.measurements import Measurements
 from analysis.data.sweeps import plane_and_view, sweeps
@@ -116,7 +117,7 @@ def reciprocity(m: Measurements, smooth: Brdf) -> Reciprocity | None:
         return None
     mean, model = (m.brdf[low] + m.brdf[high]) / 2, smooth(m.geometry)
     difference = m.brdf[low] - m.brdf[high] - (model[low] - model[high])
-    relative = np.abs(difference) / np.maximum(mean, np.finfo(float).tiny)
+    relative = relative_size(difference, np.maximum(mean, 0.0))
     median = float(np.median(relative))
     C = None if m.u_random is None else _covariance(m, smooth, low, high)
     if not (_scattered_more(m, median) if C is None else _beyond_u(C, difference, median)):
@@ -186,7 +187,7 @@ def _scatter(m: Measurements) -> float:
         f, step = m.brdf[points], np.diff(views[points])
         fine = np.maximum(step[1:], step[:-1]) <= _FINE_STEP_DEG
         middle = (step[1:] * f[:-2] + step[:-1] * f[2:]) / np.maximum(step[1:] + step[:-1], 1e-9)
-        found.append((np.abs(f[1:-1] - middle) / np.maximum(np.abs(f[1:-1]), 1e-300))[fine])
+        found.append(relative_size(f[1:-1] - middle, f[1:-1])[fine])
     bends = np.concatenate(found)
     # The mean of two neighbours and the value between them: variance 3/2 of a point's.
     return _SIGMA_PER_MEDIAN * float(np.median(bends)) / np.sqrt(1.5) if bends.size else 0.0

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from analysis.choice.checks.relative_size import relative_size
 from analysis.data.measurements import Measurements
 from analysis.data.sweeps import Sweep, plane_and_view, sweeps
 from instrument.geometry import FloatArray, IntArray
@@ -104,6 +105,6 @@ def _weaker_side(theta: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArr
 
 def _relative_u(m: Measurements, points: IntArray) -> float:
     """Relative u of a mean of the points, about: their noise, and what they share."""
-    noise = np.asarray(m.u_random)[points] / np.maximum(np.abs(m.brdf[points]), 1e-300)
+    noise = relative_size(np.asarray(m.u_random)[points], m.brdf[points])
     shared = [float(np.mean(error.u_relative[points])) for error in m.shared]
     return math.hypot(float(np.median(noise)) / math.sqrt(points.size), *shared)

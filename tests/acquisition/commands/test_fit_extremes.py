@@ -14,6 +14,7 @@ from instrument.geometry import FloatArray
 from tests.support.command import gonio_here as gonio
 
 CASES, ALL_CASES = 15, 1500
+FAILED_ONCE = (49, 1075, 1236)  # seeds: quotients beyond a double; no light but at grazing view
 ANGLES_DEG = (0.0, 5.0, 30.0, 45.0, 60.0, 75.0, 89.99, 90.0)
 HEADER = "theta_i_deg,theta_r_deg,dphi_deg,brdf"
 
@@ -21,7 +22,7 @@ HEADER = "theta_i_deg,theta_r_deg,dphi_deg,brdf"
 @pytest.mark.slow
 def test_any_table_leads_to_a_result(tmp_path: Path, slow: bool) -> None:
     """Seeded cases; a numpy warning is an error in this test run."""
-    for seed in range(ALL_CASES if slow else CASES):
+    for seed in range(ALL_CASES) if slow else (*range(CASES), *FAILED_ONCE):
         rng = np.random.default_rng(seed)
         path = tmp_path / f"{seed}.csv"
         path.write_text(table(rng))

@@ -6,6 +6,8 @@ of tables of a matt sample, half of them with a lobe.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -86,3 +88,10 @@ def test_a_long_table_costs_no_more_than_a_short_one() -> None:
     found = suspected(lamp_swapped(many), "lambert")
     assert found is not None
     assert found.code is NoteCode.LAMP_SIDE
+
+
+def test_a_table_whose_light_is_all_at_grazing_view_has_none_to_divide_by_a_cosine() -> None:
+    """The point at 90 degrees is left out there; what is left may have a mean below zero."""
+    views = np.linspace(-90.0, 80.0, 18)
+    m = Measurements.bare(5.0, views, 0.0, np.where(views == -90.0, 1.0, -1e-9), 1e-9)
+    assert suspected(replace(m, relative=True), "minnaert") is None
