@@ -27,6 +27,7 @@ from instrument.config.protocol import Steps
 from instrument.record.record import Record
 from sim.clock import SimulatedClock
 from sim.scene.camera import SimulatedCamera
+from sim.scene.render import electrons_per_s
 from sim.scene.scene import Scene
 from tests.support.scans import changed, small_scan
 from tests.support.storage.memory_folder import RAM
@@ -141,6 +142,7 @@ def soaked(azimuths: int, views: int) -> Iterator[Soaked]:
         Record.create(Path(folder) / "run", {}) as record,
     ):
         patch.setattr(acquisition.commands.scan_session, "scan_progress", watched)
+        patch.setattr("sim.scene.sensor.electrons_per_s", electrons_per_s)  # remembers no picture
         acquisition.commands.scan_session.scan(loaded, plan, record)
         yield Soaked(loaded, plan, record, watch)
 

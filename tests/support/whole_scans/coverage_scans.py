@@ -8,6 +8,7 @@ drawn freely, their mean square over 40 scans is off by a fifth, and with it all
 
 from __future__ import annotations
 
+import gc
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import NormalDist
@@ -150,6 +151,7 @@ def measured(drawn: Drawn, folder: Path) -> Measurements:
     with Record.create(folder, {}) as record:
         scan(loaded, record, changed_devices=placing)
         m = measurements(reduce(record.readings(), loaded.protocol, ()), loaded)
+    gc.collect()  # an engine and its frames are few objects, in a circle: seldom looked for
     return _mean_sample(m, loaded)
 
 
