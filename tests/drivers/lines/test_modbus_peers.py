@@ -60,7 +60,7 @@ def _arrives(drive: OrientalController) -> None:
 
 
 def test_minimalmodbus_homes_and_moves_our_drive(drive: OrientalController) -> None:
-    minimalmodbus = pytest.importorskip("minimalmodbus")
+    minimalmodbus = pytest.importorskip("minimalmodbus", reason="minimalmodbus is not installed")
     with PtyWire([drive]) as wire:
         master = minimalmodbus.Instrument(wire.port, 1)
         try:
@@ -139,7 +139,7 @@ def _compiled(folder: Path) -> Path:
     source, program = Path(__file__).with_name("libmodbus_slave.c"), folder / "slave"
     compiler = shutil.which("cc")
     if not compiler:
-        pytest.skip("cc is not installed")
+        pytest.skip("a C compiler (Debian package gcc) is not installed")
     flags = ["-Wall", "-Wextra", "-Werror", "-I/usr/include/modbus"]
     found = subprocess.run(
         [compiler, "-E", *flags, "-include", "modbus.h", "-x", "c", os.devnull],
@@ -182,7 +182,7 @@ def _joined_ports() -> Iterator[tuple[str, str]]:
 
 @pytest.mark.filterwarnings("ignore:isSet:DeprecationWarning")  # modbus_tk's own
 def test_our_line_with_a_slave_of_modbus_tk() -> None:
-    pytest.importorskip("modbus_tk")
+    pytest.importorskip("modbus_tk", reason="modbus_tk is not installed")
     import serial
     from modbus_tk import defines, modbus_rtu
 
@@ -199,7 +199,7 @@ def test_our_line_with_a_slave_of_modbus_tk() -> None:
 
 
 def test_our_line_with_a_slave_of_pymodbustcp() -> None:
-    pytest.importorskip("pyModbusTCP")
+    pytest.importorskip("pyModbusTCP", reason="pyModbusTCP is not installed")
     from pyModbusTCP.server import DataBank, ModbusServer
 
     bank = DataBank(h_regs_size=256)

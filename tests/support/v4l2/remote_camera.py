@@ -152,7 +152,9 @@ def served(
 def child(factory: pytest.TempPathFactory) -> Iterator[RemoteCamera]:
     """Start the child; skip what needs it where there is no compiler, as real cameras do not."""
     if which("cc") is None:
-        pytest.skip("no C compiler (cc): the emulated V4L2 camera cannot be built")
+        pytest.skip(
+            "no C compiler (Debian: gcc, libc6-dev): the emulated V4L2 camera cannot be built"
+        )
     remote = RemoteCamera(factory.mktemp("v4l2"))
     try:
         yield remote

@@ -97,7 +97,7 @@ def test_the_truth_lies_within_u_in_about_95_percent_of_the_cells(
     tmp_path: Path, slow: bool, record_property: Callable[[str, object], None]
 ) -> None:
     if not slow:
-        pytest.skip("24 scans take a minute; one is tested above")
+        pytest.skip("24 scans take a minute: with --slow; one is tested above")
     inside: dict[str, list[np.ndarray]] = {name: [] for name in (*ALBEDOS, "sigma_deg")}
     rejected = []
     for number, varied in enumerate(MORE):

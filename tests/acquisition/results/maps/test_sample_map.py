@@ -67,7 +67,7 @@ def test_the_truth_lies_within_u_in_about_95_percent_of_the_cells(
     tmp_path: Path, slow: bool
 ) -> None:
     if not slow:
-        pytest.skip("36 scans take a minute; one of each pattern is tested above")
+        pytest.skip("36 scans take a minute: with --slow; one of each pattern is tested above")
     inside: dict[str, list[np.ndarray]] = {"albedo": [], "sigma_deg": []}
     rejected = []
     for number, varied in enumerate(MORE):
