@@ -81,8 +81,8 @@ class Session:
         """Do one action with damaged replies, then read the position over a sound line."""
         rng = random.Random(number)
         memory, action = self.memory, rng.choice(ACTIONS)
-        memory.wire.heard.clear()
-        memory.wire.genuine.clear()
+        for kept in (memory.wire.heard, memory.wire.genuine, memory.wire.sent):
+            kept.clear()
         memory.clock.readings, began_s, moves = 0, memory.clock.now_s(), memory.moves()
         memory.spoil_next(rng, self.spoil)
         said = ""
