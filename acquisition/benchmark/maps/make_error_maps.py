@@ -1,6 +1,6 @@
 """Maker of `error_maps.npz`: the largest error of each approximate method, cell by cell.
 
-`python -m acquisition.benchmark.maps.make_error_maps` computes it (four minutes on one core of
+`python -m acquisition.benchmark.maps.make_error_maps` computes it (a minute on one core of
 2 GHz). Its reader, `analysis.models.error_maps`, describes the file and the margins.
 """
 
