@@ -198,7 +198,7 @@ class Positioner:
         """Stop every axis and close the shutter, even if some of them fail.
 
         All stops are sent, that of what moves first, before it is waited until the axes were read
-        to stand. An action interrupted by a Ctrl-C is repeated, however often, and that is logged.
+        to stand. An action interrupted by a Ctrl-C is repeated, however often, and this is logged.
         """
         names = sorted(AXES, key=lambda name: name != self.moving)
         axes = [(name, self._axes[name]) for name in names if name in self._axes]

@@ -137,8 +137,9 @@ def _possible(m: Measurements) -> list[_Mistake]:
 def _fit_of(m: Measurements) -> FirstFit | None:
     """First fit of the model; None for too few points, or for a part of them that has no light."""
     model = MODELS[_MODEL]
-    lit = enough_points(model, m) and np.mean(m.brdf) > 0
-    return FirstFits(m).of(model) if lit else None
+    if not (enough_points(model, m) and np.mean(m.brdf) > 0):
+        return None
+    return FirstFits(m).of(model)
 
 
 def _clearly_better(fit: FirstFit, as_given: float) -> bool:
