@@ -123,8 +123,18 @@ class Grid:
         curves = np.stack([white.curve(int(node), found[node]) for node in minima])
         chosen = minima[_different(curves, chi2[minima], count)]
         x = layout.x[chosen]
-        x[:, solved] = np.clip(found[chosen], _OFF_ZERO * high, high)
+        most = np.array([_highest_start(parameters[i]) for i in solved])
+        x[:, solved] = np.clip(found[chosen], _OFF_ZERO * high, most)
         return list(x)
+
+
+def _highest_start(parameter: Parameter) -> float:
+    """Highest starting value of a parameter that is solved for: its upper bound, but for a level.
+
+    At the upper bound of a level, the albedo 1, its derivative is infinite: a search that starts
+    there moves the other parameters in its place, and may end in the wrong minimum.
+    """
+    return max(parameter.starts) if parameter.level else parameter.high
 
 
 @dataclass(frozen=True, slots=True)
