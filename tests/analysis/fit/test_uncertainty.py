@@ -2,9 +2,8 @@
 
 Fitted with the true model: 95 % intervals cover the truth in 93.5 to 96.5 % of 2000 scans, and the
 standard deviation of the estimates is at most 1.05 times the Cramer-Rao bound. The whole choice:
-the right physics in 95 %, the simpler model in 95 % without that term, of 500 scans, once the part
-of the extra term that the simpler model cannot follow has lambda = sum((part / u)^2) = 25. The
-share of 500 scans has a standard deviation of 1 % itself, which the limit allows for. `make test`
+the right physics in 95 % of 500 scans once the part of the extra term that the simpler model cannot
+follow has lambda = sum((part / u)^2) = 25; the simpler model in 95 % without that term. `make test`
 runs some of the scans, with wider limits accordingly; `pytest --slow` runs all. The results are
 properties in the file that `--junitxml FILE` writes.
 """
@@ -53,9 +52,9 @@ STEPS = [
     ),
 ]
 
-# EON is Oren and Nayar's rough surface with its energy preserved (Portsmouth, Kutz, Hill 2024): a
-# noise of 40 %, at which lambda is 25, leaves no difference between them.
-SAME_PHYSICS = {"eon": "rough"}
+# Shares of all 500 scans that are known to be below 95 %. In 1.8 % of the scans of a rough surface
+# EON is chosen, which preserves energy: at a noise of 40 %, where lambda is 25, they look the same.
+MISSED = {"oren_nayar": 0.936, "wolff": 0.948}
 
 BOUNDED, FEW = 0.01, 0.004  # fractions of the scans and of the choices that `make test` runs
 
@@ -206,11 +205,6 @@ def noise_for(simpler: str, right: str, truth: Mapping[str, float], noncentralit
     return 0.01 * math.sqrt(left / noncentrality)
 
 
-def surface(name: str) -> str:
-    """Physics of a candidate, whatever the method or the form of its rough surface."""
-    return SAME_PHYSICS.get(name, physics(name))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("simpler", "plain", "right", "truth"), STEPS)
 def test_the_right_model_is_chosen_where_the_data_allow_and_else_the_simpler_one(
@@ -220,12 +214,16 @@ def test_the_right_model_is_chosen_where_the_data_allow_and_else_the_simpler_one
     truth: dict[str, float],
     slow: bool,
     record_property: Callable[[str, object], None],
+    request: pytest.FixtureRequest,
 ) -> None:
+    if slow and right in MISSED:
+        reason = f"{right} in {100 * MISSED[right]:.1f} % of 500 scans, where 95 % are promised"
+        request.applymarker(pytest.mark.xfail(reason=reason, strict=True))
     share = 1.0 if slow else FEW
     u, count = noise_for(simpler, right, truth, 25.0), round(500 * share)
-    least = 0.95 - (1 if share == 1 else 3) * math.sqrt(0.95 * 0.05 / count)
+    least = 0.95 - (0 if share == 1 else 3 * math.sqrt(0.95 * 0.05 / count))
     for name, values in ((right, truth), (simpler, plain)):
         chosen = [choose(m).chosen or "" for m in scans(name, values, u, count)]
-        found = np.mean([surface(c) == surface(name) for c in chosen])
+        found = np.mean([physics(c) == physics(name) for c in chosen])
         record_property(f"{name} against {simpler}: share chosen", float(found))
         assert found >= least, (name, found, sorted(set(chosen)))
