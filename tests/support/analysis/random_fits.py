@@ -44,8 +44,10 @@ class Case:
         return f"seed {self.seed}: {self.model.name}, {self.measurements.size} points"
 
 
-def random_case(seed: int, names: tuple[str, ...] = SINGLE + SUMS) -> Case:
-    """Scan of 1 to 3 incidences, whole, half or stopped; noise of 3e-5 to 1 %.
+def random_case(
+    seed: int, names: tuple[str, ...] = SINGLE + SUMS, most_noise: float = 0.01
+) -> Case:
+    """Scan of 1 to 3 incidences, whole, half or stopped; noise of 3e-5 to 1 %, or to `most_noise`.
 
     Half of the scans share errors: of a white tile (.5 %), and of the lamp's angle (.02 degrees).
     """
@@ -54,7 +56,7 @@ def random_case(seed: int, names: tuple[str, ...] = SINGLE + SUMS) -> Case:
     theta_i, theta_r = _angles(rng)
     truth = np.array([_value(p.name, rng) for p in model.parameters])
     values = dict(zip((p.name for p in model.parameters), map(float, truth), strict=True))
-    noise, shared = 10 ** rng.uniform(np.log10(3e-5), -2), bool(rng.random() < 0.5)
+    noise, shared = 10 ** rng.uniform(*np.log10([3e-5, most_noise])), bool(rng.random() < 0.5)
     u_theta_i, u_tile = (0.02, 0.005) if shared else (0.0, 0.0)
     setting = setting_numbers(theta_i, np.zeros(theta_i.size))
     true_i = np.abs(theta_i + u_theta_i * rng.normal(size=setting.max() + 1)[setting])
