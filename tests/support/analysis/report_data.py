@@ -40,17 +40,21 @@ def png(width: int = 4, height: int = 3) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + parts
 
 
-def data_of(
-    incidences: tuple[float, ...] = (30.0, 60.0),
-    dphis: tuple[float, ...] = (0.0,),
-    theta_r: tuple[float, ...] = tuple(range(-60, 61, 15)),
-    **changes: Any,
-) -> ReportData:
-    rows = [(i, d, r) for d in dphis for i in incidences for r in theta_r]
-    theta_i_deg, dphi_deg, theta_r_deg = np.array(rows, dtype=np.float64).T
-    brdf = tilted(theta_i_deg, dphi_deg, theta_r_deg)
-    points = len(rows)
-    good = Candidate(
+POOR = Candidate(
+    name="lambert",
+    parameters=(Parameter("ks", 0.01, None, (0.0, 0.123), ""),),
+    rms_relative=0.1,
+    reduced_chi2=96.4,
+    bic=-120.0,
+    converged=True,
+    chosen=False,
+    curve=flat,
+)
+
+
+def good_candidate(points: int) -> Candidate:
+    """The chosen candidate, with a residual for each of the points."""
+    return Candidate(
         name="oren_nayar",
         parameters=(
             Parameter("albedo", 0.90123, 0.0021, None, ""),
@@ -64,17 +68,18 @@ def data_of(
         residuals=np.linspace(-2, 2, points),
         curve=tilted,
     )
-    loose = Parameter("ks", 0.01, None, (0.0, 0.123), "")
-    poor = Candidate(
-        name="lambert",
-        parameters=(loose,),
-        rms_relative=0.1,
-        reduced_chi2=96.4,
-        bic=-120.0,
-        converged=True,
-        chosen=False,
-        curve=flat,
-    )
+
+
+def data_of(
+    incidences: tuple[float, ...] = (30.0, 60.0),
+    dphis: tuple[float, ...] = (0.0,),
+    theta_r: tuple[float, ...] = tuple(range(-60, 61, 15)),
+    **changes: Any,
+) -> ReportData:
+    rows = [(i, d, r) for d in dphis for i in incidences for r in theta_r]
+    theta_i_deg, dphi_deg, theta_r_deg = np.array(rows, dtype=np.float64).T
+    brdf = tilted(theta_i_deg, dphi_deg, theta_r_deg)
+    points = len(rows)
     data = ReportData(
         title="Wall plaster",
         sample="plaster A",
@@ -91,7 +96,7 @@ def data_of(
         u_radiance=1e3 * brdf,
         flags=("",) * points,
         fitted=np.ones(points, dtype=bool),
-        candidates=(poor, good),
+        candidates=(POOR, good_candidate(points)),
         budget=(("photon noise", 0.17, 62.0), ("white tile", NAN, NAN)),
         previews=(Preview(0, "at 30°", png(), [[0.0, 0.0], [3.0, 0.0], [3.0, 2.0]]),),
         rig=(("lamp", "halogen"),),
